@@ -44,6 +44,7 @@ use std::process::ExitCode;
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
+use crate::io::recorder::format::PROGRAM_VERSION;
 use print::Verbosity;
 use status::status_of;
 
@@ -53,7 +54,7 @@ use status::status_of;
 /// speed is corrected over TCP. Try `truebead demo` first: it runs the whole
 /// loop with nothing attached.
 #[derive(Debug, Parser)]
-#[command(name = "truebead", version, propagate_version = true, max_term_width = 100)]
+#[command(name = "truebead", version = PROGRAM_VERSION, propagate_version = true, max_term_width = 100)]
 pub struct Cli {
     /// Say more: -v what is being done, -vv every detail
     #[arg(short, long, action = ArgAction::Count, global = true, display_order = 900)]

@@ -46,7 +46,9 @@ use crate::run::runner::Runner;
 
 use capture::CapturePipeline;
 pub use control::Ending;
-use control::{ControlThread, ExtruderWatch, LiveInputs, Notices, StatusLine, StepsWatch};
+use control::{
+    ControlThread, ExtruderWatch, LiveInputs, Notices, SetpointClock, StatusLine, StepsWatch,
+};
 use journal::Journal;
 use run_logger::RunLogger;
 
@@ -187,7 +189,10 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         },
         runner: Runner::with_extruder(controller, robot, extruder, recorder),
         extruder: watch,
-        period: Span::from_secs(1.0 / live.run.robot.rate_hz),
+        setpoints: SetpointClock::new(
+            live.clock.now(),
+            Span::from_secs(1.0 / live.run.robot.rate_hz),
+        ),
         duration: live.duration,
         robot_z,
         robot_view,

@@ -54,6 +54,7 @@ fn the_demo_closes_the_loop_and_its_recording_replays_bit_for_bit() {
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     assert!(page.contains("<svg") && !page.contains("src=\"http"));
     assert!(replay(&out.join("recording.mcap")).contains("all the same bit for bit"));
+    another_version_is_refused(&out.join("recording.mcap"), folder.path());
     // What was recorded can be measured again, at the heights of then.
     let measured = folder.path().join("again");
     fs::copy("cells/demo.toml", folder.path().join("cell.toml")).unwrap();
@@ -67,6 +68,24 @@ fn the_demo_closes_the_loop_and_its_recording_replays_bit_for_bit() {
         .status()
         .unwrap();
     same_widths(&out, &measured);
+}
+
+/// A recording of another version is refused with status 2, unless it is asked for.
+fn another_version_is_refused(recording: &Path, folder: &Path) {
+    let mut bytes = fs::read(recording).unwrap();
+    let version = truebead().arg("--version").output().unwrap().stdout;
+    let version =
+        String::from_utf8(version).unwrap().trim_start_matches("truebead ").trim().to_owned();
+    let at = bytes.windows(version.len()).position(|part| part == version.as_bytes()).unwrap();
+    bytes[at] = b'9';
+    let other = folder.join("other.mcap");
+    fs::write(&other, bytes).unwrap();
+    let refused = truebead().arg("replay").arg(&other).output().unwrap();
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains(&version) && said.contains("--any-version"), "{said}");
+    let asked = truebead().args(["replay", "--any-version"]).arg(&other).status().unwrap();
+    assert!(asked.success());
 }
 
 /// Every tenth frame was recorded; measured again it has the same width. Frames are

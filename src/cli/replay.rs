@@ -14,7 +14,7 @@ use super::status::WITH_LOSS;
 use crate::assembly::extruder;
 use crate::cell::file::{ExtruderPart, Purpose};
 use crate::control::{Controller, Step};
-use crate::io::recorder::ExtruderFile;
+use crate::io::recorder::{ExtruderFile, format::PROGRAM_VERSION};
 use crate::io::recording::{RecordedEntry, Recording};
 use crate::io::replay::{Difference, ReplayReport, replay};
 
@@ -31,7 +31,7 @@ A recording that was cut short (recording.mcap.partial) is replayed as far as
 it goes.
 
 Exit status: 0 all steps are the same, 1 a step differs, 2 the file is not a
-recording that can be replayed, 3 events are missing from its middle.";
+recording that this version can replay, 3 events are missing from its middle.";
 
 /// Feeds recorded events to the controller and compares its steps bit for bit.
 #[derive(Debug, Args)]
@@ -40,11 +40,18 @@ pub struct ReplayArgs {
     /// A recording of this program
     #[arg(value_name = "RECORDING.mcap")]
     recording: PathBuf,
+    /// Compare although another version of truebead made the recording
+    #[arg(long)]
+    any_version: bool,
 }
 
 /// Runs the command.
 pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     let mut recording = open(&args.recording)?;
+    refuse_foreign(&recording)?;
+    if !args.any_version {
+        refuse_other_version(&recording)?;
+    }
     let mut controller = recorded_controller(&recording)?;
     let progress = progress_bar();
     let report =
@@ -59,10 +66,22 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<ExitCode> {
     Ok(status)
 }
 
+/// Refuses a recording of another version: its controller may take other steps, and be right.
+fn refuse_other_version(recording: &Recording) -> Result<(), WrongArguments> {
+    let Some(run) = recording.run().filter(|run| run.program_version != PROGRAM_VERSION) else {
+        return Ok(());
+    };
+    refuse!(
+        "{}: recorded by truebead {}, and this is {PROGRAM_VERSION}, whose steps may differ; replay it \
+         with the version that recorded it, or with --any-version to see the first step that differs",
+        recording.file(),
+        run.program_version
+    );
+}
+
 /// The controller in its state at the start of the run.
 fn recorded_controller(recording: &Recording) -> anyhow::Result<Controller> {
     let file = recording.file();
-    refuse_foreign(recording)?;
     let (cell, calibration) = attached_cell(recording, Purpose::Run)
         .context("the controller cannot be set up")
         .map_err(WrongArguments::new)?;

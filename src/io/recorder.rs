@@ -39,7 +39,7 @@ use crate::run::ports::{RecordError, Recorder};
 use config::RecorderLimits;
 pub use config::{ExtruderFile, RecordConfig};
 use encode::FrameJob;
-use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, RunInfo};
+use format::{CALIBRATION_ATTACHMENT, CELL_ATTACHMENT, FORMAT_VERSION, PROGRAM_VERSION, RunInfo};
 use mux::Mux;
 use report::Counts;
 pub use report::{Incomplete, RecordReport};
@@ -77,7 +77,7 @@ fn start_with<S: Sink + 'static>(
 ) -> Result<(RecorderHandle, Receiver<RecordError>), RecordError> {
     let run = RunInfo {
         format_version: FORMAT_VERSION,
-        program_version: env!("CARGO_PKG_VERSION").to_string(),
+        program_version: PROGRAM_VERSION.to_owned(),
         epoch_ns: config.epoch_ns,
         cell_name: config.cell_name.clone(),
     };

@@ -8,6 +8,7 @@ mod frames;
 mod inputs;
 mod notices;
 mod robot;
+mod setpoint_clock;
 mod status_line;
 mod steps;
 
@@ -29,6 +30,7 @@ pub use ending::Ending;
 pub use extruder_watch::ExtruderWatch;
 pub use inputs::{Inputs, LiveInput, LiveInputs};
 pub use notices::Notices;
+pub use setpoint_clock::SetpointClock;
 pub use status_line::StatusLine;
 pub use steps::StepsWatch;
 
@@ -43,7 +45,7 @@ pub struct ControlThread<'a, I, K> {
     pub inputs: I,
     pub runner: LiveRunner<K>,
     pub extruder: Option<ExtruderWatch>,
-    pub period: Span,
+    pub setpoints: SetpointClock,
     pub duration: Option<Span>,
     pub robot_z: RobotZ,
     pub robot_view: Option<RobotView>,
@@ -101,7 +103,6 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
 
     fn until_ended(&mut self) -> Ending {
         let start = self.inputs.now();
-        let mut due = start + self.period;
         let mut extruder_due = self.extruder.as_ref().map(|side| start + side.period());
         let over = self.duration.map(|duration| start + duration);
         let mut lost: Option<String> = None;
@@ -113,9 +114,10 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             if self.steps.is_some_and(StepsWatch::is_over) {
                 return Ending::StepsOver;
             }
+            let due = self.setpoints.due();
             if now >= due {
                 self.tick(due);
-                due = next_due(due, self.period, self.inputs.now());
+                self.setpoints.sent(self.inputs.now());
                 if let Some(why) = &lost
                     && matches!(self.notices.state(), Some(State::Fault(_) | State::Idle))
                 {

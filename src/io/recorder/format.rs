@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 /// Version of this layout; a reader refuses a newer one. By definition 1 is the first.
 pub const FORMAT_VERSION: u32 = 1;
 
+/// Version of the program with a hash of its sources: only the same program gives the same steps bit
+/// for bit.
+pub const PROGRAM_VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("TRUEBEAD_SOURCES"));
+
 /// Events, as JSON.
 pub const EVENT_TOPIC: &str = "/truebead/event";
 /// Steps, as JSON.

@@ -15,6 +15,9 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         let event = event_of(&measured);
         let MeasuredFrame { frame, had_at, mut outcome, roughness, edges, .. } = measured;
         let (seq, captured_at) = (frame.seq, frame.captured_at);
+        if outcome.is_ok() {
+            self.setpoints.width_arrived(self.inputs.now());
+        }
         let step = self.give(event).step;
         if step.trace.frame_repeated {
             outcome = Err(Reject::Repeated);

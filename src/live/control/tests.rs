@@ -164,7 +164,7 @@ impl<K: Recorder> Run<K> {
             inputs: self.script,
             runner: Runner::with_extruder(controller, robot, None, self.recorder),
             extruder: None,
-            period: Span::from_secs(1.0 / RATE_HZ),
+            setpoints: SetpointClock::new(Stamp::START, Span::from_secs(1.0 / RATE_HZ)),
             duration: self.duration,
             robot_z: RobotZ::default(),
             robot_view: None,
