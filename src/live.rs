@@ -163,6 +163,7 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         capture::Optics {
             cell: live.cell.clone(),
             calibration: live.calibration.clone(),
+            latency: live.run.camera.latency,
             robot_z: robot_z.clone(),
         },
         recorder.frames(),

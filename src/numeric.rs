@@ -7,6 +7,7 @@
 
 pub mod average;
 pub mod blurred_step;
+pub mod estimate;
 pub mod gauss_legendre;
 pub mod hampel;
 pub mod levenberg_marquardt;

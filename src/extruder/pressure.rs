@@ -9,9 +9,9 @@
 //!
 //! Readings and commands have independent rates. [`PressureController::measured`] takes each
 //! reading; [`PressureController::step`] gives each command, 20 a second in the paper. Model
-//! predictions are exact at any rate, so a feedforward at 200 Hz is the same call made more
-//! often. A controller reads no clock, allocates nothing in these two calls and never leaves
-//! its [`super::limits::CommandLimits`] \[rpm\].
+//! predictions are exact at any rate. A controller reads no clock, allocates nothing in these two
+//! calls and never leaves the range of its [`super::limits::CommandLimits`] \[rpm\]; the limit of
+//! the rate counts from the first command on, which the supervisor takes from standstill itself.
 
 use super::limits::{CommandLimit, LimitError};
 use crate::core::{MPa, Rpm, Span, Stamp};

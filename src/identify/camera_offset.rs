@@ -20,6 +20,7 @@ mod data;
 mod error;
 mod estimate;
 pub mod laid_speeds;
+mod latency;
 mod observation;
 mod offset_profile;
 mod whiten;
@@ -31,6 +32,7 @@ use data::PooledWidths;
 pub use error::{CameraOffsetError, MIN_PIECES, MIN_WIDTHS};
 pub use estimate::{EXPONENT_RANGE, OffsetEstimate, OffsetStudy, SpeedRange, WidthAtSpeed};
 use laid_speeds::LaidSpeeds;
+pub use latency::{LatencyEstimate, find_with_latency};
 use observation::BeadObservation;
 use offset_profile::{NearlyAsGood, OffsetProfile};
 use whiten::WidthNoise;
@@ -94,26 +96,11 @@ pub fn study(
     let count = widths.len();
     let observations: Vec<BeadObservation> =
         widths.iter().filter_map(|width| observed(&course, width)).collect();
-    if observations.len() < MIN_WIDTHS {
-        return Err(CameraOffsetError::TooFew { found: observations.len() });
-    }
-    let speeds = course.range(TAIL_FRACTION);
-    if speeds.max.get() < speeds.min.get() * (1.0 + MIN_SPEED_CHANGE) {
-        return Err(CameraOffsetError::ConstantSpeed { speeds });
-    }
+    let speeds = changed_speeds(&course, observations.len())?;
     let settled = iterate(&course, &observations, search, speeds)?;
     settled.check(&course, &observations, search)?;
     let Converged { profile, best, .. } = &settled;
-    let found = OffsetEstimate {
-        offset: mm(best.offset_mm),
-        sigma: mm(profile.sigma_mm(best).hypot(course.position_sigma_mm())),
-        exponent: best.exponent,
-        at_bound: best.exponent <= EXPONENT_RANGE.0 || best.exponent >= EXPONENT_RANGE.1,
-        speeds,
-        used: settled.used.len(),
-        left_out: count - settled.used.len(),
-        residual_rms: profile.residual_rms(best),
-    };
+    let found = settled.estimate(&course, speeds, count);
     if found.sigma >= found.offset {
         return Err(CameraOffsetError::Uncertain { offset: found.offset, sigma: found.sigma });
     }
@@ -131,12 +118,33 @@ pub fn study(
     })
 }
 
+/// The speeds of a bead, if there are enough widths and the speed has changed.
+fn changed_speeds(course: &LaidSpeeds, widths: usize) -> Result<SpeedRange, CameraOffsetError> {
+    if widths < MIN_WIDTHS {
+        return Err(CameraOffsetError::TooFew { found: widths });
+    }
+    let speeds = course.range(TAIL_FRACTION);
+    if speeds.max.get() < speeds.min.get() * (1.0 + MIN_SPEED_CHANGE) {
+        return Err(CameraOffsetError::ConstantSpeed { speeds });
+    }
+    Ok(speeds)
+}
+
 fn observed(course: &LaidSpeeds, width: &TimedWidth) -> Option<BeadObservation> {
-    let (bead, path_mm) = course.path_at(width.at)?;
+    let at = width.at;
+    let (bead, path_mm) = course.path_at(at)?;
     let (value, sigma) = (width.width.get(), width.sigma.get());
     let (ln_width, relative_sigma) = (value.ln(), sigma / value);
     let is_sound = value > 0.0 && sigma >= 0.0;
-    is_sound.then_some(BeadObservation { bead, path_mm, ln_width, relative_sigma })
+    let since_capture_mm = 0.0;
+    is_sound.then_some(BeadObservation {
+        at,
+        bead,
+        path_mm,
+        since_capture_mm,
+        ln_width,
+        relative_sigma,
+    })
 }
 
 /// Consistent offset, exponent, noise and set of widths.
@@ -188,6 +196,21 @@ fn iterate(
 }
 
 impl Converged {
+    /// The estimate, from so many widths in all.
+    fn estimate(&self, course: &LaidSpeeds, speeds: SpeedRange, count: usize) -> OffsetEstimate {
+        let Self { used, profile, best, .. } = self;
+        OffsetEstimate {
+            offset: mm(best.offset_mm),
+            sigma: mm(profile.sigma_mm(best).hypot(course.position_sigma_mm())),
+            exponent: best.exponent,
+            at_bound: best.exponent <= EXPONENT_RANGE.0 || best.exponent >= EXPONENT_RANGE.1,
+            speeds,
+            used: used.len(),
+            left_out: count - used.len(),
+            residual_rms: profile.residual_rms(best),
+        }
+    }
+
     /// Whether the widths determine the best offset.
     fn check(
         &self,

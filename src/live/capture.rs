@@ -8,7 +8,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use super::mailbox::Mailbox;
 use crate::calibration::{Calibration, SurfaceMap};
 use crate::cell::Cell;
-use crate::core::{Frame, ImagePoint, Stamp};
+use crate::core::{Frame, ImagePoint, Span, Stamp};
 use crate::io::clock::RunClock;
 use crate::io::recorder::FrameTap;
 use crate::run::ports::{FrameSource, Grab};
@@ -23,6 +23,8 @@ pub struct Optics {
     pub cell: Cell,
     /// The calibration of its images.
     pub calibration: Calibration,
+    /// How much later than its capture a frame has its time stamp.
+    pub latency: Span,
     /// The robot's z over time.
     pub robot_z: RobotZ,
 }
@@ -90,9 +92,10 @@ impl CapturePipeline {
         let (messages, seen) = unbounded();
         let mailbox = Arc::new(Mailbox::default());
         let (filling, camera_messages) = (Arc::clone(&mailbox), messages.clone());
+        let latency = optics.latency;
         let camera = Builder::new()
             .name("camera".to_owned())
-            .spawn(move || take_frames(source, &filling, &camera_messages, clock))?;
+            .spawn(move || take_frames(source, latency, &filling, &camera_messages, clock))?;
         let taking = Arc::clone(&mailbox);
         let measure = Builder::new()
             .name("measure".to_owned())
@@ -115,13 +118,17 @@ impl CapturePipeline {
 
 fn take_frames(
     mut source: Box<dyn FrameSource>,
+    latency: Span,
     mailbox: &Mailbox<Taken>,
     messages: &Sender<CameraMessage>,
     clock: RunClock,
 ) {
     let why = loop {
         let taken = match source.next_frame() {
-            Ok(Some(Grab::Frame { frame, .. })) => Taken::Frame(frame, clock.now()),
+            Ok(Some(Grab::Frame { mut frame, .. })) => {
+                frame.captured_at = frame.captured_at - latency;
+                Taken::Frame(frame, clock.now())
+            }
             Ok(Some(Grab::Unreadable { seq, reason, .. })) => {
                 Taken::Unreadable { seq, at: clock.now(), reason }
             }
@@ -218,7 +225,8 @@ mod tests {
             robot_z: Mm::ZERO,
             quality: None,
         };
-        let optics = Optics { cell, calibration, robot_z: RobotZ::default() };
+        let robot_z = RobotZ::default();
+        let optics = Optics { cell, calibration, latency: Span::ZERO, robot_z };
         for (at, z) in [(1.0, 20.0), (1.5, 40.0)] {
             let state = RobotState {
                 robot_time_ms: None,

@@ -40,6 +40,8 @@ pub struct Simulation {
     pub report: Span,
     /// Latency of a width, from capture to arrival at the controller.
     pub latency: Span,
+    /// How much later than its capture a frame has its time stamp: a camera that gives none.
+    pub stamp_delay: Span,
     /// Bandwidth of the robot's speed loop \[Hz\].
     pub robot_bandwidth_hz: f64,
     /// Whether the phases of camera and robot link are random, as in a real cell, or zero.
@@ -105,6 +107,7 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
         step: Span::from_secs(step_ms / 1e3),
         report: Span::from_secs(report_ms.unwrap_or(step_ms) / 1e3),
         latency: Span::from_secs(world.number("latency_ms", 0.0..=1000.0, 0.0) / 1e3),
+        stamp_delay: Span::from_secs(world.number("stamp_delay_ms", 0.0..=1000.0, 0.0) / 1e3),
         robot_bandwidth_hz: world.number("robot_bandwidth_hz", 0.01..=1000.0, 10.0),
         random_phase: world.choice("phase", &[("random", true), ("aligned", false)], true),
         gauge_length: world.mm("gauge_length_mm", 0.0..=1e4, 0.0),

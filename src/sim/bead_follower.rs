@@ -1,5 +1,7 @@
 //! Lays a simulated bead behind a robot, from the position that the robot reports.
 
+use std::collections::VecDeque;
+
 use super::hash;
 use super::laid::{LaidBead, PathSpeed};
 use crate::core::{Mm, RobotMode, RobotState, Span, Stamp};
@@ -15,6 +17,9 @@ const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 /// Largest decrease of the path within one bead \[mm\]: above the rounding of reports, below any
 /// move.
 const PATH_TOLERANCE_MM: f64 = 0.01;
+
+/// Reports that are kept: 2.5 s at 50 Hz, more than a frame is late.
+const MAX_REPORTS: usize = 128;
 
 /// Parameters of every bead.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,20 +42,20 @@ pub struct BeadFollower {
     recipe: BeadRecipe,
     beads: u64,
     laid: LaidBead,
-    before: Option<(Stamp, RobotState)>,
-    last: Option<(Stamp, RobotState)>,
+    /// The last reports with their times of arrival, in order.
+    reports: VecDeque<(Stamp, RobotState)>,
 }
 
 impl BeadFollower {
     /// For a robot from which no report has arrived yet.
     pub fn new(recipe: BeadRecipe) -> Self {
-        Self { recipe, beads: 0, laid: bead_of(&recipe, 0), before: None, last: None }
+        Self { recipe, beads: 0, laid: bead_of(&recipe, 0), reports: VecDeque::new() }
     }
 
     /// Takes a report and its time of arrival. Reports are in order.
     pub fn observe(&mut self, at: Stamp, state: &RobotState) {
         if lays(state.mode) {
-            let previous = self.last.map(|(_, last)| last);
+            let previous = self.reports.back().map(|(_, last)| *last);
             let goes_on = previous.is_some_and(|last| lays(last.mode) && follows(&last, state));
             if goes_on && let Some(last) = previous {
                 self.laid.lay_ramp(path_speed(&last), path_speed(state));
@@ -58,7 +63,10 @@ impl BeadFollower {
                 self.begin(previous, state);
             }
         }
-        self.before = self.last.replace((at, *state));
+        if self.reports.len() == MAX_REPORTS {
+            self.reports.pop_front();
+        }
+        self.reports.push_back((at, *state));
     }
 
     /// Begins a new bead where the robot stood before it printed; at path 0 if that is unknown.
@@ -72,24 +80,27 @@ impl BeadFollower {
         self.laid.lay(from, path, state.speed_mm_per_s.get());
     }
 
-    /// Path of the nozzle at a time \[mm\]: interpolated between the last two reports, and
-    /// extrapolated at the last speed for up to half a second. `None` before the first report.
+    /// Path of the nozzle at a time \[mm\]: interpolated between two reports, and extrapolated at
+    /// the last speed for up to half a second. `None` before the oldest report that is kept, and
+    /// where the path falls or jumps.
     pub fn path_at(&self, at: Stamp) -> Option<f64> {
-        let (reported, state) = self.last?;
+        let (reported, state) = *self.reports.back()?;
         let path = state.path_mm.get();
         let ahead = at - reported;
         if ahead >= Span::ZERO {
             let moves = if lays(state.mode) { state.speed_mm_per_s.get() } else { 0.0 };
             return Some(path + moves * ahead.min(MAX_EXTRAPOLATION).secs());
         }
-        let (earlier, old) = self.before.filter(|(_, old)| follows(old, &state))?;
-        let fraction = ((at - earlier).secs() / (reported - earlier).secs()).max(0.0);
-        Some(old.path_mm.get() + (path - old.path_mm.get()) * fraction)
+        let after = self.reports.partition_point(|(reported, _)| *reported <= at);
+        let (from, old) = self.reports.get(after.checked_sub(1)?)?;
+        let (to, new) = self.reports.get(after).filter(|(_, new)| follows(old, new))?;
+        let fraction = (at - *from).secs() / (*to - *from).secs();
+        Some(old.path_mm.get() + (new.path_mm - old.path_mm).get() * fraction)
     }
 
     /// Last reported height of the nozzle; `None` before the first report.
     pub fn z(&self) -> Option<Mm> {
-        self.last.map(|(_, state)| state.z_mm)
+        self.reports.back().map(|(_, state)| state.z_mm)
     }
 
     /// The current or last bead.

@@ -334,9 +334,13 @@ impl<K: Recorder> SimCell<K> {
         let other = self.other_bead.as_ref().filter(|(from, _)| path >= *from);
         let bead = other.map_or(&self.bead, |(_, bead)| bead);
         let taken = self.camera.take(self.now, under, state.z_mm, bead);
-        let latency = self.cell.simulation.latency;
-        let arrival =
-            Arrival { at: self.now + latency, captured_at: self.now, position_mm: under, taken };
+        let simulation = &self.cell.simulation;
+        let arrival = Arrival {
+            at: self.now + simulation.latency.max(simulation.stamp_delay),
+            captured_at: self.now + simulation.stamp_delay - self.run.camera.latency,
+            position_mm: under,
+            taken,
+        };
         self.pending_widths.push_back(arrival);
         self.arrivals(self.now, observer);
     }

@@ -2,6 +2,8 @@
 //! of the flow, pulsation, a wrong exponent, a wrong camera offset. Every case is laid with many
 //! seeds in four cells, and judged by the bead itself, not by what was measured.
 
+pub mod bead_figures;
+mod latency;
 pub mod live;
 mod mismatch;
 pub mod plant;
@@ -29,6 +31,8 @@ pub enum Case {
     Mismatch,
     /// Another bead in view, and beads on which nothing is wrong.
     Response,
+    /// A camera whose frames are stamped late, its offset and latency found from steps of the speed.
+    Latency,
     /// The pressure loop with a plant and a sensor that are not its model's.
     Pressure,
 }
@@ -41,6 +45,7 @@ impl Case {
             Self::Pulsation => pulsation::rows,
             Self::Mismatch => mismatch::rows,
             Self::Response => response::rows,
+            Self::Latency => latency::rows,
             Self::Pressure => return pressure::rows(seeds, progress),
         };
         let mut rows = Vec::new();

@@ -5,6 +5,7 @@ use crate::document::Problems;
 use crate::extruder::adaptive::SubSystemError;
 use crate::extruder::feedforward::FeedforwardError;
 use crate::extruder::pressure::PressureError;
+use crate::identify::camera_offset::CameraOffsetError;
 use crate::identify::fit::{FitError, SamplesError};
 use crate::identify::prbs::NoSuchLength;
 use crate::identify::start_stop::StartStopFitError;
@@ -61,6 +62,9 @@ pub enum ReproduceError {
     /// A corner cannot be planned or run.
     #[error(transparent)]
     Corner(#[from] CornerError),
+    /// The offset of a camera cannot be found.
+    #[error("the camera's offset: {0}")]
+    Offset(#[from] CameraOffsetError),
     /// The model of a plant is not valid.
     #[error(transparent)]
     Model(#[from] ModelError),

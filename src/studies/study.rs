@@ -4,6 +4,7 @@ use maud::Markup;
 use serde::Serialize;
 
 use super::publication::Publication;
+use crate::numeric::estimate::Estimate;
 
 /// Seeds of the experiments; `None` stands for the study's own number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -65,6 +66,12 @@ pub struct TableRow {
     pub simulated: Option<f64>,
     /// The result of this program's best method on the same plant; `None` if there is none.
     pub ours: Option<f64>,
+    /// Half of the 95 % confidence interval of `simulated`, where it is a mean over seeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub simulated_confidence: Option<f64>,
+    /// Half of the 95 % confidence interval of `ours`, where it is a mean over seeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ours_confidence: Option<f64>,
 }
 
 /// The rows of one paper, collected.
@@ -91,7 +98,33 @@ impl TableRows {
         [published, simulated, ours]: [Option<f64>; 3],
     ) {
         let (paper, case) = (self.paper, case.into());
-        self.rows.push(TableRow { paper, case, quantity, unit, published, simulated, ours });
+        self.rows.push(TableRow {
+            paper,
+            case,
+            quantity,
+            unit,
+            published,
+            simulated,
+            ours,
+            simulated_confidence: None,
+            ours_confidence: None,
+        });
+    }
+
+    /// As [`Self::push`], for means over seeds.
+    pub fn means(
+        &mut self,
+        case: impl Into<String>,
+        quantity: Quantity,
+        published: Option<f64>,
+        [simulated, ours]: [Option<Estimate>; 2],
+    ) {
+        let mean = |found: Option<Estimate>| found.map(|found| found.mean);
+        self.push(case, quantity, [published, mean(simulated), mean(ours)]);
+        if let Some(row) = self.rows.last_mut() {
+            row.simulated_confidence = simulated.and_then(|found| found.confidence);
+            row.ours_confidence = ours.and_then(|found| found.confidence);
+        }
     }
 
     /// Adds a row without a published number.

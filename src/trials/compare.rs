@@ -1,14 +1,13 @@
 //! Several controllers on the same plant with the same seeds.
 
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::layer::LayerTrial;
 use super::score::BeadPoint;
 use crate::calibration::Calibration;
 use crate::cell::file::{Cell, RunPart};
 use crate::core::Mm;
-use crate::numeric::average::mean;
+use crate::numeric::estimate::Estimate;
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::rank::mean_median;
 use crate::sim::cell::SimCellError;
@@ -22,8 +21,6 @@ pub const JUDGED_AFTER_MM: f64 = 30.0;
 pub const SIGMA_AFTER_MM: f64 = 700.0;
 /// Length of the segments over which errors of all seeds are combined \[mm\].
 const PIECE_MM: f64 = 5.0;
-/// Confidence level of the intervals. By definition of "95 %" in the tables.
-const CONFIDENCE: f64 = 0.95;
 
 /// A controller with its cell; bead, simulation and calibration are those of the common plant.
 #[derive(Debug, Clone)]
@@ -61,24 +58,14 @@ pub struct SeedStatistics {
 impl SeedStatistics {
     /// Statistics of one number per seed; infinity or NaN stands for no number.
     pub fn of(mut values: Vec<f64>) -> Self {
-        let finite = values.iter().all(|value| value.is_finite());
-        let count = to_f64(values.len());
-        let middle = mean(values.iter().copied());
-        let variance = mean(values.iter().map(|value| (value - middle).powi(2)));
-        let spread = (variance / (count - 1.0).max(1.0)).sqrt();
+        let Estimate { mean, confidence } = Estimate::of(&values);
         let median = mean_median(&mut values).unwrap_or(f64::NAN);
         Self {
-            mean: finite.then_some(middle),
-            confidence: confidence_factor(count).filter(|_| finite).map(|times| times * spread),
+            mean: mean.is_finite().then_some(mean),
+            confidence,
             median: median.is_finite().then_some(median),
         }
     }
-}
-
-/// Half the confidence interval of a mean of `count` values, in standard errors of the mean.
-fn confidence_factor(count: f64) -> Option<f64> {
-    let student = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
-    Some(student.inverse_cdf(0.5 * (1.0 + CONFIDENCE)))
 }
 
 /// Figures of a controller at one width.
@@ -175,13 +162,9 @@ mod tests {
     }
 
     #[test]
-    fn statistics_are_mean_median_and_confidence() {
+    fn statistics_are_mean_and_median_of_what_was_reached() {
         let estimate = SeedStatistics::of(vec![1.0, 2.0, 3.0, 6.0]);
         assert_eq!((estimate.mean, estimate.median), (Some(3.0), Some(2.5)));
-        // s² = 14/3, s/√4 = 1.0801; Student's t of 3 degrees of freedom is 3.1824.
-        assert!((estimate.confidence.unwrap() - 3.1824 * 1.0801).abs() < 1e-3);
-        assert!((confidence_factor(100.0).unwrap() - 1.9842).abs() < 1e-3);
-        assert_eq!(SeedStatistics::of(vec![2.0]).confidence, None);
         let never = SeedStatistics::of(vec![1.0, f64::INFINITY, 2.0]);
         assert_eq!((never.mean, never.median), (None, Some(2.0)));
         assert_eq!(SeedStatistics::of(vec![f64::INFINITY; 3]).median, None);

@@ -6,7 +6,7 @@ use crate::document::Table;
 use crate::extruder::pressure::Fopdt;
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::extruder::pressure::pi::PressurePiGains;
-use crate::extruder::pressure::tuning::Tuning;
+use crate::extruder::pressure::tuning::{LoopPeriods, Tuning};
 use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::rheology::PowerLaw;
 use crate::extruder::strategy::{PressureChoice, PressureSettings};
@@ -61,7 +61,10 @@ pub(super) fn read(table: &Table<'_>, context: &ReadContext<'_>) -> Option<Press
     let noise = or_report(table, "sensor_noise_mpa", PressureNoise::new(drift?, sigma?.powi(2)));
     let choice = match word? {
         ControllerWord::Predictive => {
-            Some(PressureChoice::Predictive(Tuning::of(&model?, &noise?)))
+            let rates = context.rates;
+            let periods =
+                LoopPeriods { reading_s: 1.0 / rates.io_hz, command_s: 1.0 / rates.control_hz };
+            Some(PressureChoice::Predictive(Tuning::of(&model?, &noise?, periods)))
         }
         ControllerWord::Vsfc => read_vsfc(table, noise?).map(PressureChoice::Vsfc),
         ControllerWord::Pi => read_pi(table).map(PressureChoice::Pi),

@@ -62,6 +62,9 @@ pub struct CameraSettings {
     pub offset: Mm,
     /// Standard deviation of that distance.
     pub offset_sigma: Mm,
+    /// How much later than its capture a frame has its time stamp: of a camera whose frames carry
+    /// no time of capture.
+    pub latency: Span,
     /// Longest wait for a frame before the camera counts as lost.
     pub deadline: Span,
 }
@@ -89,6 +92,7 @@ pub(super) fn read_camera(
     });
     let offset = table.number("offset_mm", 0.0..=1e5);
     let sigma = table.optional_number("offset_sigma_mm", 0.0..=1e4);
+    let latency_ms = table.number_or("latency_ms", 0.0..=2000.0, 0.0);
     let deadline = table.number_or("deadline_s", 0.05..=600.0, 2.0);
     Some(CameraSettings {
         source: source?,
@@ -97,6 +101,7 @@ pub(super) fn read_camera(
         mount: mount?,
         offset: Mm::new(offset?).ok()?,
         offset_sigma: Mm::new(sigma.unwrap_or(OFFSET_SIGMA_FRACTION * offset?)).ok()?,
+        latency: Span::from_secs(latency_ms? / 1e3),
         deadline: Span::from_secs(deadline?),
     })
 }

@@ -21,7 +21,8 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<ExitCode> {
         args.refuse("a recording", &args.of_image())?;
         recording::run(args)?;
     } else {
-        args.refuse("an image", &[("--max-mm", args.max_mm.is_some())])?;
+        let of_recording = [("--max-mm", args.max_mm.is_some()), ("--latency", args.latency)];
+        args.refuse("an image", &of_recording)?;
         board::run(args)?;
     }
     Ok(ExitCode::SUCCESS)

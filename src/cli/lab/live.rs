@@ -17,7 +17,8 @@ use crate::io::progress::Progress;
 use crate::link::{PrintJob, RobotParams};
 use crate::rows::output;
 use crate::simulators::robot::{RobotOptions, RobotSim};
-use crate::studies::control::live::{BEAD_MM, LiveFigures, cell_text, laid, rows};
+use crate::studies::control::bead_figures::{BeadFigures, late_rows, rows};
+use crate::studies::control::live::{BEAD_MM, cell_text, laid};
 use crate::studies::control::plant::LoopCell;
 use crate::studies::control::table::{CaseRow, plain};
 
@@ -49,7 +50,7 @@ pub fn run(args: &LiveArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     output::make_folder(&args.out)?;
     let total = args.runs.checked_mul(4);
     let mut progress = Progress::new("laying", "beads", total, voice.quiet);
-    let mut all = Vec::new();
+    let (mut all, mut every) = (Vec::new(), Vec::new());
     for (number, cell) in LoopCell::ALL.into_iter().enumerate() {
         let mut beads = Vec::new();
         for seed in 1..=args.runs {
@@ -57,8 +58,10 @@ pub fn run(args: &LiveArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
             beads.push(lay(cell, seed, &folder)?);
             progress.advance();
         }
-        all.extend(rows(cell, &beads)?);
+        all.extend(rows(cell, "live", &beads)?);
+        every.extend(beads.into_iter().map(|bead| (cell, bead)));
     }
+    all.extend(late_rows("all cells", "live", &every));
     progress.finish();
     let json = serde_json::to_vec_pretty(&all).context("control.json")?;
     output::write_whole(&args.out, "control.json", &json)?;
@@ -68,7 +71,7 @@ pub fn run(args: &LiveArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
 }
 
 /// Lays one bead with the program's own live run.
-fn lay(cell: LoopCell, seed: u64, folder: &Path) -> anyhow::Result<LiveFigures> {
+fn lay(cell: LoopCell, seed: u64, folder: &Path) -> anyhow::Result<BeadFigures> {
     let clock = RunClock::start();
     let listener = TcpListener::bind("127.0.0.1:0").context("cannot listen on this machine")?;
     let robot = RobotSim::spawn(listener, clock, robot_options(), Box::new(|_, _| {}))?;
@@ -83,7 +86,7 @@ fn lay(cell: LoopCell, seed: u64, folder: &Path) -> anyhow::Result<LiveFigures> 
     robot.stop();
     let trial = laid(&simulated, &states)
         .with_context(|| format!("control of the bead in {} never began", folder.display()))?;
-    Ok(LiveFigures::of(cell, &trial))
+    Ok(BeadFigures::of(cell, &trial))
 }
 
 fn robot_options() -> RobotOptions {

@@ -36,6 +36,7 @@ pub struct RenderedCamera {
     clock: RunClock,
     period: Span,
     offset_mm: f64,
+    stamp_delay: Span,
     rides: bool,
     seq: u64,
     due: Option<Stamp>,
@@ -67,6 +68,7 @@ impl RenderedCamera {
             clock,
             period: Span::from_secs(1.0 / camera.rate_hz),
             offset_mm: camera.offset.get(),
+            stamp_delay: simulation.stamp_delay,
             rides: camera.mount == Mount::Flange,
             seq: 0,
             due: None,
@@ -100,7 +102,8 @@ impl FrameSource for RenderedCamera {
         for (at, state) in self.reports.try_iter() {
             self.follower.observe(at, &state);
         }
-        let under = self.follower.path_at(captured_at).map(|nozzle| nozzle - self.offset_mm);
+        let nozzle = self.follower.path_at(captured_at - self.stamp_delay);
+        let under = nozzle.map(|nozzle| nozzle - self.offset_mm);
         let bead = self.follower.bead();
         let robot_z = self.follower.z().filter(|_| self.rides);
         let rendered = self

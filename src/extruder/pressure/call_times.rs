@@ -86,6 +86,12 @@ impl CallTimes {
         self.last_command.speed = applied;
     }
 
+    /// Leaves out the time until now: it was a hold, with a speed in force.
+    pub fn resume(&mut self, now: Stamp, applied: Rpm) {
+        self.step_at = self.step_at.map(|last| last.max(now));
+        self.settle(applied);
+    }
+
     /// The command in force.
     pub const fn last_command(&self) -> ScrewCommand {
         self.last_command

@@ -49,10 +49,16 @@ impl Load {
         self.settled + (self.now - self.settled) * libm::exp(-dt_s / self.lag_s)
     }
 
-    /// Adds a part that has settled \[MPa\].
+    /// Slow average of the residual \[MPa\].
+    pub const fn average(&self) -> f64 {
+        self.average
+    }
+
+    /// Adds a part that has settled \[MPa\]: it is in the residual no more.
     pub fn add(&mut self, settled: f64) {
         self.settled += settled;
         self.now += settled;
+        self.average -= settled;
     }
 
     /// Looks for a step of the load in the residual of a reading, `dt_s` after the last, with a

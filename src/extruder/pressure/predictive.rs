@@ -1,7 +1,7 @@
-//! Predictive control with two degrees of freedom. The feedforward inverts the model; the feedback is
-//! PI control of what the pressure lacks of the one that the feedforward should give, with part of
-//! what it has already corrected within the dead time. With a plant that is not the model it is
-//! therefore no worse than PI control: the model makes the feedforward, not the feedback.
+//! Predictive control with two degrees of freedom. The feedforward inverts the model. The feedback is
+//! PI control on the feedforward's predicted pressure less the measured one, with four tenths of a
+//! Smith correction. The model makes the feedforward, not the feedback: a plant that is not the
+//! model costs little more than with PI control (`docs/src/explanation/pressure-control.md`).
 //!
 //! - A step of the target goes only part of the way until the pressure has answered
 //!   ([`super::target_step`]).
@@ -15,9 +15,8 @@
 use super::call_times::{CallTimes, InitialState, bounded};
 use super::command_history::CommandHistory;
 use super::load::Load;
-use super::reference::FIRST_PERIOD_S;
 use super::residual::Residual;
-use super::target_step::{Answer, FILTER_DELAY_S, TargetStep};
+use super::target_step::{Answer, TargetStep};
 use super::tuning::Tuning;
 use super::{Fopdt, PressureController, ReadingRefused, ScrewCommand};
 use crate::core::{MPa, Rpm, Span, Stamp};
@@ -38,6 +37,12 @@ const BOUNDED_FOR: f64 = 1.0;
 /// Time in which a pressure answers a step of its target, in dead times and lags together. Derived:
 /// 98 % of the answer of a plant that is twice as slow as the model.
 const ANSWER_WITHIN: f64 = 5.0;
+/// The same since the model, with the screw's limits, predicts an answer. Derived: less the dead time.
+const ANSWER_SINCE_ASKED: f64 = 4.0;
+/// Shortest such time \[s\]: a plant may be much quicker than its readings.
+const MIN_ANSWER_S: f64 = 1.0;
+/// Longest time between two commands that counts \[s\].
+const MAX_PERIOD_S: f64 = 1.0;
 /// Dead times that are looked back. Derived: twice that of the model, and some.
 const LOOK_BACK: f64 = 2.5;
 
@@ -65,6 +70,8 @@ pub struct PredictiveController {
     integral: f64,
     /// Until when the feedback works in full \[s\].
     awake_until_s: f64,
+    /// Time of readings that were left out since the last one that was used \[s\].
+    unused_s: f64,
     period_s: f64,
 }
 
@@ -73,7 +80,7 @@ impl PredictiveController {
     /// load.
     pub fn new(model: Fopdt, tuning: Tuning, limits: CommandLimits, running: InitialState) -> Self {
         let (speed, pressure) = (running.speed.get(), running.pressure.get());
-        let look_back_s = LOOK_BACK * model.dead_time_s() + FILTER_DELAY_S;
+        let look_back_s = LOOK_BACK * model.dead_time_s() + tuning.periods.filter_delay_s();
         Self {
             model,
             tuning,
@@ -89,8 +96,16 @@ impl PredictiveController {
             takeover_offset: running.target.get() - pressure,
             integral: 0.0,
             awake_until_s: f64::NEG_INFINITY,
-            period_s: FIRST_PERIOD_S,
+            unused_s: 0.0,
+            period_s: tuning.periods.command_s,
         }
+    }
+
+    /// Goes on after a hold in which the screw had a speed: the model has followed it, the integral
+    /// leaves it out.
+    pub fn resume(&mut self, now: Stamp, applied: Rpm) {
+        self.calls.resume(now, applied);
+        self.commanded.push(now.secs(), applied.get());
     }
 
     fn span_s(&self) -> f64 {
@@ -112,10 +127,22 @@ impl PredictiveController {
             }
             self.awake_until_s = now_s + self.tuning.awake_s;
         }
-        let bounded_s = BOUNDED_FOR * self.span_s();
-        if self.step.is_some_and(|step| step.has_answered() && now_s - step.began_s > bounded_s) {
+        let is_over = |step: TargetStep| {
+            let lasts_s = now_s - step.began_s;
+            if step.has_answered() {
+                lasts_s > BOUNDED_FOR * self.span_s()
+            } else {
+                lasts_s > self.answers_within_s() && step.unanswered_s(now_s).is_none()
+            }
+        };
+        if self.step.is_some_and(is_over) {
             self.step = None;
         }
+    }
+
+    /// Time in which a pressure answers \[s\].
+    fn answers_within_s(&self) -> f64 {
+        (ANSWER_WITHIN * self.span_s()).max(MIN_ANSWER_S)
     }
 
     fn begin_step(&mut self, now_s: f64) {
@@ -126,9 +153,8 @@ impl PredictiveController {
         self.integral -= fed_back;
         self.fed_back.restart(0.0);
         let commanded = self.commanded.pressure_at(now_s);
-        let arrived = self.commanded.pressure_at(now_s - self.model.dead_time_s());
-        let measured = arrived + self.load.now() + self.residual.filtered();
         let expected = commanded + self.load.ahead(self.model.dead_time_s());
+        let measured = expected + self.load.average();
         self.step = Some(TargetStep::new(now_s, expected, commanded, measured));
     }
 
@@ -146,12 +172,12 @@ impl PredictiveController {
         } else {
             (QUIET_FRACTION * proportional, 1.0 / QUIET_INTEGRAL_S)
         };
-        // Without an answer an error in the direction of the step says nothing yet.
+        // Before an answer an error in the direction of the step says nothing yet.
         let waits = self
             .step
             .is_some_and(|step| !step.has_answered() && step.sign(self.target) * error > 0.0);
         if !waits {
-            self.integral = bounded(self.integral + rate * error * dt_s);
+            self.integral = bounded(self.integral + rate * error * dt_s.min(MAX_PERIOD_S));
         }
         gain * error + self.integral
     }
@@ -188,13 +214,16 @@ impl PredictiveController {
     fn within_step(&mut self, now_s: f64, drive: f64) -> f64 {
         let Some(mut step) = self.step else { return drive };
         let dead_s = self.model.dead_time_s();
-        let arrived = self.commanded.pressure_at(now_s - dead_s - FILTER_DELAY_S);
+        let delay_s = self.tuning.periods.filter_delay_s();
+        let arrived = self.commanded.pressure_at(now_s - dead_s - delay_s);
         let answer = Answer {
             arrived,
-            arrived_late: self.commanded.pressure_at(now_s - 2.0 * dead_s - FILTER_DELAY_S),
+            arrived_late: self.commanded.pressure_at(now_s - 2.0 * dead_s - delay_s),
             measured: arrived + self.load.now() + self.residual.filtered(),
+            sigma: self.residual.sigma(),
+            is_due: now_s - step.began_s >= dead_s + delay_s,
         };
-        let bound = step.bound(self.target, &answer);
+        let bound = step.bound(now_s, self.target, &answer);
         self.step = Some(step);
         let farthest = self.drive(self.commanded.pressure_at(now_s), bound);
         let sign = step.sign(self.target);
@@ -208,12 +237,14 @@ impl PressureController for PredictiveController {
         self.load.advance(dt_s);
         let arrived = self.commanded.pressure_at(now.secs() - self.model.dead_time_s());
         let residual = pressure.get() - arrived - self.load.now();
+        self.unused_s += dt_s;
         if !self.residual.update(residual) {
             return Ok(());
         }
+        let since_s = std::mem::take(&mut self.unused_s);
         if now.secs() < self.awake_until_s {
             self.load.follow(residual);
-        } else if let Some(shown) = self.load.detect(residual, self.residual.sigma(), dt_s) {
+        } else if let Some(shown) = self.load.detect(residual, self.residual.sigma(), since_s) {
             self.residual.shift(shown);
             self.load_stepped = true;
             self.awake_until_s = now.secs() + self.tuning.awake_s;
@@ -224,7 +255,7 @@ impl PressureController for PredictiveController {
     fn step(&mut self, now: Stamp, target: MPa) -> ScrewCommand {
         let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
         if dt_s > 0.0 {
-            self.period_s = dt_s.clamp(1e-4, 1.0);
+            self.period_s = dt_s.clamp(1e-4, MAX_PERIOD_S);
             self.takeover_offset *= libm::exp(-dt_s / self.model.lag_s());
         }
         let now_s = now.secs();
@@ -245,8 +276,10 @@ impl PressureController for PredictiveController {
     }
 
     fn is_unanswered(&self, now: Stamp) -> bool {
+        let since_asked_s = (ANSWER_SINCE_ASKED * self.span_s()).max(MIN_ANSWER_S);
         self.step.is_some_and(|step| {
-            !step.has_answered() && now.secs() - step.began_s > ANSWER_WITHIN * self.span_s()
+            now.secs() - step.began_s > self.answers_within_s()
+                && step.unanswered_s(now.secs()).is_some_and(|missing| missing > since_asked_s)
         })
     }
 

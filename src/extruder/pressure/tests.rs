@@ -6,12 +6,12 @@ use super::kalman::PressureNoise;
 use super::pi::{PressurePi, PressurePiGains};
 use super::predictive::PredictiveController;
 use super::smith::SmithPi;
-use super::tuning::Tuning;
+use super::tuning::{LoopPeriods, Tuning};
 use super::vsfc::{Vsfc, VsfcGains};
 use super::*;
 use crate::core::{MPa, Rpm};
 use crate::extruder::limits::CommandLimits;
-use crate::sim::pressure::{Disturbances, SimPressure};
+use crate::sim::pressure::{Disturbances, LoadChange, SimPressure};
 
 const FASTEST: Rpm = Rpm::constant(3.0);
 const PERIOD: Span = Span::from_millis(50);
@@ -25,7 +25,7 @@ fn noise() -> PressureNoise {
 }
 
 fn predictive(limits: CommandLimits, running: InitialState) -> PredictiveController {
-    let tuning = Tuning::of(&model(), &noise());
+    let tuning = Tuning::of(&model(), &noise(), LoopPeriods::MA_2026);
     PredictiveController::new(model(), tuning, limits, running)
 }
 
@@ -70,6 +70,7 @@ fn drive(
         if tick.is_multiple_of(10) {
             plant.command(controller.step(now, MPa::constant(target(plant.now_s()))).speed);
         }
+        assert!(!controller.is_unanswered(now), "unanswered after {} s", plant.now_s());
         trajectory.push((plant.pressure(), plant.speed_rpm()));
         plant.advance();
         tick += 1;
@@ -212,7 +213,7 @@ fn a_model_out_of_range_is_refused_with_its_value() {
 fn a_process_without_dead_time_is_held_as_well() {
     let process = Fopdt::new(0.02, 2.0, 0.0).unwrap();
     let noise = PressureNoise::new(1e-6, 1e-4).unwrap();
-    let tuning = Tuning::of(&process, &noise);
+    let tuning = Tuning::of(&process, &noise, LoopPeriods::MA_2026);
     let limits = CommandLimits::new(0.0, 300.0, 1e6).unwrap();
     let start = running(1.0, 1.0, 50.0);
     let mut controller = PredictiveController::new(process, tuning, limits, start);
@@ -254,7 +255,7 @@ proptest! {
 /// the last fifth.
 fn step_of(model: Fopdt, process: Fopdt) -> [f64; 3] {
     let start = running(0.0, 0.0, 0.0);
-    let tuning = Tuning::of(&model, &noise());
+    let tuning = Tuning::of(&model, &noise(), LoopPeriods::MA_2026);
     let mut controller = PredictiveController::new(model, tuning, free(), start);
     let disturbed = Disturbances { noise_mpa2: 4.98e-5, seed: 1, ..Disturbances::default() };
     let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
@@ -293,4 +294,121 @@ fn any_plant_that_is_about_like_its_model_is_held() {
             }
         }
     }
+}
+
+fn noisy(seed: u64) -> Disturbances {
+    Disturbances { noise_mpa2: 4.98e-5, seed, ..Disturbances::default() }
+}
+
+#[test]
+fn a_target_that_returns_within_the_dead_time_is_answered_by_a_sound_plant() {
+    for change in [-0.2, -0.05, 0.2] {
+        for lasts_s in [0.1, 0.25, 0.4] {
+            for seed in 0..5 {
+                let start = running(0.6, 0.6, 0.6);
+                let mut controller = predictive(free(), start);
+                let mut plant = SimPressure::new(model(), noisy(seed), FASTEST, start);
+                let pulse = |at: f64| if (3.0..3.0 + lasts_s).contains(&at) { change } else { 0.0 };
+                let trajectory = drive(&mut controller, &mut plant, 20.0, |at| 0.6 + pulse(at));
+                let (last, _) = trajectory[trajectory.len() - 1];
+                assert!((last - 0.6).abs() < 0.02, "{change} for {lasts_s} s: {last}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_second_step_while_the_first_is_answered_takes_no_longer_than_the_first() {
+    let start = running(0.2, 0.2, 0.2);
+    let mut controller = predictive(free(), start);
+    let mut plant = SimPressure::new(model(), noisy(1), FASTEST, start);
+    let target = |at: f64| {
+        if at < 3.0 {
+            0.2
+        } else if at < 3.8 {
+            0.6
+        } else {
+            1.0
+        }
+    };
+    let trajectory = drive(&mut controller, &mut plant, 10.0, target);
+    let reaches = trajectory.iter().position(|(pressure, _)| *pressure > 0.96).unwrap();
+    #[expect(clippy::cast_precision_loss, reason = "a few thousand ticks")]
+    let after_s = reaches as f64 * 0.005 - 3.8;
+    assert!(after_s < 1.15, "{after_s}");
+}
+
+#[test]
+fn a_screw_at_its_limit_or_slow_to_speed_up_is_no_lack_of_an_answer() {
+    let start = running(0.95, 0.95, 0.95);
+    let at_most_1 = CommandLimits::new(0.0, 1.0, 1e6).unwrap();
+    let mut plant = SimPressure::new(model(), noisy(2), FASTEST, start);
+    drive(
+        &mut predictive(at_most_1, start),
+        &mut plant,
+        30.0,
+        |at| if at < 3.0 { 0.95 } else { 1.3 },
+    );
+    let start = running(0.0, 0.0, 0.0);
+    let slow = CommandLimits::new(0.0, 3.0, 0.01).unwrap();
+    let mut plant = SimPressure::new(model(), noisy(3), FASTEST, start);
+    drive(&mut predictive(slow, start), &mut plant, 90.0, |_| 0.6);
+    assert!((plant.pressure() - 0.6).abs() < 0.02, "{}", plant.pressure());
+}
+
+#[test]
+fn a_plant_that_is_quicker_than_its_readings_is_answered() {
+    let process = Fopdt::new(1.0, 0.01, 0.0).unwrap();
+    let start = running(0.2, 0.2, 0.2);
+    let tuning = Tuning::of(&process, &noise(), LoopPeriods::MA_2026);
+    let mut controller = PredictiveController::new(process, tuning, free(), start);
+    let mut plant = SimPressure::new(process, noisy(4), FASTEST, start);
+    drive(&mut controller, &mut plant, 10.0, |at| if at < 2.0 { 0.2 } else { 0.6 });
+    assert!((plant.pressure() - 0.6).abs() < 0.02, "{}", plant.pressure());
+}
+
+#[test]
+fn slow_readings_and_commands_are_allowed_for() {
+    // Five commands a second, and ten readings.
+    for (lag, dead) in [(0.2, 0.0), (0.3, 0.1), (0.84, 0.41)] {
+        let process = Fopdt::new(1.0, lag, dead).unwrap();
+        let periods = LoopPeriods { reading_s: 0.1, command_s: 0.2 };
+        let tuning = Tuning::of(&process, &noise(), periods);
+        let start = running(0.0, 0.0, 0.0);
+        let mut controller = PredictiveController::new(process, tuning, free(), start);
+        let mut plant = SimPressure::new(process, noisy(5), FASTEST, start);
+        let mut pressures = Vec::new();
+        for tick in 0..4000_u64 {
+            let now = Stamp::from_secs(plant.now_s());
+            if tick.is_multiple_of(20) {
+                controller.measured(now, plant.read().unwrap()).unwrap();
+            }
+            if tick.is_multiple_of(40) {
+                plant.command(controller.step(now, MPa::constant(0.6)).speed);
+            }
+            pressures.push(plant.pressure());
+            plant.advance();
+        }
+        let highest = pressures.iter().copied().fold(0.0, f64::max);
+        assert!(highest < 0.63, "{process:?}: {highest}");
+        assert!(pressures[2000..].iter().all(|one| (one - 0.6).abs() < 0.02), "{process:?}");
+    }
+}
+
+#[test]
+fn commands_that_come_late_do_not_wind_the_integral_up() {
+    let start = running(0.6, 0.6, 0.6);
+    let mut controller = predictive(free(), start);
+    // A load just before five seconds without a call.
+    let load = Some(LoadChange { at_s: 2.9, rpm: 0.1 });
+    let disturbed = Disturbances { load, ..noisy(6) };
+    let mut plant = SimPressure::new(model(), disturbed, FASTEST, start);
+    drive(&mut controller, &mut plant, 3.0, |_| 0.6);
+    let until = plant.now_s() + 5.0;
+    while plant.now_s() < until {
+        plant.advance();
+    }
+    let trajectory = drive(&mut controller, &mut plant, 30.0, |_| 0.6);
+    let lowest = trajectory.iter().map(|(pressure, _)| *pressure).fold(9.0, f64::min);
+    assert!(lowest > 0.45, "{lowest}");
 }

@@ -4,9 +4,11 @@
 use super::interface::{BadReading, CommandDemand, ExtruderController, RequiredReading};
 use crate::core::{MPa, Mm3PerS, Rpm, Span, Stamp};
 use crate::extruder::limits::{CommandLimit, CommandLimits};
+use crate::extruder::pressure::call_times::MAX_READING;
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::extruder::pressure::pi::{PressurePi, PressurePiGains};
 use crate::extruder::pressure::predictive::PredictiveController;
+use crate::extruder::pressure::residual::SPIKE_SIGMAS;
 use crate::extruder::pressure::tuning::Tuning;
 use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
 use crate::extruder::pressure::{Fopdt, InitialState, PressureController};
@@ -45,6 +47,8 @@ pub struct PressureLoop {
     settings: PressureSettings,
     active: Option<ActiveController>,
     target: MPa,
+    /// A reading from which no controller has taken over: it may be an outlier.
+    first_reading: Option<MPa>,
     /// Screw speed that was kept in a hold \[rpm\].
     held_rpm: Option<f64>,
     command_rpm: f64,
@@ -93,8 +97,28 @@ impl ActiveController {
 impl PressureLoop {
     /// Before the first bead.
     pub const fn new(settings: PressureSettings) -> Self {
-        let (target, limit) = (MPa::ZERO, CommandLimit::None);
-        Self { settings, active: None, target, held_rpm: None, command_rpm: 0.0, limit }
+        Self {
+            settings,
+            active: None,
+            target: MPa::ZERO,
+            first_reading: None,
+            held_rpm: None,
+            command_rpm: 0.0,
+            limit: CommandLimit::None,
+        }
+    }
+
+    /// A controller from the second of two readings in a row that agree; none before.
+    fn taken_over(&mut self, pressure: MPa) -> Option<ActiveController> {
+        let within = self.settings.noise.sigma() * SPIKE_SIGMAS;
+        let last = self.first_reading.replace(pressure);
+        last.filter(|last| (pressure - *last).abs() < within)?;
+        // A pressure while the screw stands is left from the last bead, as if the screw had turned
+        // at the speed that matches it.
+        let matching = pressure.get().max(0.0) / self.settings.model.gain();
+        let speed = Rpm::new(self.held_rpm.unwrap_or(matching)).ok()?;
+        let running = InitialState { pressure, target: pressure, speed };
+        Some(ActiveController::new(&self.settings, running))
     }
 
     /// Sets the target pressure for a flow; unchanged where the power law has none.
@@ -113,20 +137,20 @@ impl ExtruderController for PressureLoop {
     fn begin(&mut self, _now: Stamp, flow: Mm3PerS) -> CommandDemand {
         self.set_target(flow);
         // The screw stands until the pump runs; the controller takes over from there.
-        (self.active, self.held_rpm, self.command_rpm) = (None, None, 0.0);
+        (self.active, self.first_reading, self.held_rpm) = (None, None, None);
+        (self.command_rpm, self.limit) = (0.0, CommandLimit::None);
         self.demand()
     }
 
     fn reported(&mut self, now: Stamp, report: &ExtruderReport) -> Result<(), BadReading> {
         let pressure = report.pressure_mpa.ok_or(BadReading)?;
-        let settings = &self.settings;
-        // A pressure while the screw stands is left from the last bead. It falls as if the
-        // screw had turned at the matching speed until now.
-        let before = self.held_rpm.unwrap_or(pressure.get().max(0.0) / settings.model.gain());
-        let speed = Rpm::new(before).map_err(|_| BadReading)?;
-        let active = self.active.get_or_insert_with(|| {
-            ActiveController::new(settings, InitialState { pressure, target: pressure, speed })
-        });
+        if self.active.is_none() {
+            if pressure.abs() > MAX_READING {
+                return Err(BadReading);
+            }
+            self.active = self.taken_over(pressure);
+        }
+        let Some(active) = &mut self.active else { return Ok(()) };
         active.controller_mut().measured(now, pressure).map_err(|_| BadReading)
     }
 
@@ -152,9 +176,16 @@ impl ExtruderController for PressureLoop {
         CommandDemand { value, feedforward, feedback: value - feedforward }
     }
 
-    fn resume(&mut self, _now: Stamp, applied: f64) {
-        // Controllers keep the times of their calls; a new one does not integrate the hold.
-        (self.active, self.held_rpm, self.command_rpm) = (None, Some(applied), applied);
+    fn resume(&mut self, now: Stamp, applied: f64) {
+        self.command_rpm = applied;
+        if let (Some(ActiveController::Predictive(running)), Ok(applied)) =
+            (&mut self.active, Rpm::new(applied))
+        {
+            running.resume(now, applied);
+            return;
+        }
+        // The others keep the times of their calls; a new one does not integrate the hold.
+        (self.active, self.held_rpm, self.first_reading) = (None, Some(applied), None);
     }
 
     fn limit(&self) -> CommandLimit {

@@ -9,7 +9,7 @@ use crate::extruder::feedforward::{InverseSettings, RightHalfPlaneZeros, Tracker
 use crate::extruder::limits::CommandLimits;
 use crate::extruder::pressure::kalman::PressureNoise;
 use crate::extruder::pressure::pi::PressurePiGains;
-use crate::extruder::pressure::tuning::Tuning;
+use crate::extruder::pressure::tuning::{LoopPeriods, Tuning};
 use crate::extruder::pressure::vsfc::VsfcGains;
 use crate::extruder::pressure::{Fopdt, InitialState};
 use crate::extruder::report::ExtruderReport;
@@ -22,6 +22,7 @@ use crate::extruder::{
     Supervisor,
 };
 use crate::numeric::lti::{Between, Simulator, TransferFunction};
+use crate::sim::hash;
 use crate::sim::pressure::{Disturbances, SimPressure};
 use crate::sim::screw::{Integrator, SimScrew};
 
@@ -157,7 +158,7 @@ fn pressed(iterate: fn(&Fopdt, PressureNoise) -> PressureChoice) -> (Supervisor,
 }
 
 fn predictive(process: &Fopdt, noise: PressureNoise) -> PressureChoice {
-    PressureChoice::Predictive(Tuning::of(process, &noise))
+    PressureChoice::Predictive(Tuning::of(process, &noise, LoopPeriods::MA_2026))
 }
 
 #[test]
@@ -207,6 +208,95 @@ fn a_pressure_that_does_not_answer_its_target_is_a_fault_before_the_screw_runs_a
     assert!((last - 40.0).abs() < 2.0, "{last}");
     run(&mut side, &mut machine, (4200, 4300), Laying::Bead(flow(0.8)));
     assert_eq!(side.state(), ExtruderState::Fault(ExtruderFault::NoPressureResponse));
+}
+
+#[test]
+fn a_screw_that_conveys_nothing_is_a_fault_whatever_the_noise() {
+    let flow = |pressure| PowerLaw::PP_GF28.flow(MPa::constant(pressure)).unwrap();
+    for (seed, step) in (0..8).flat_map(|seed| [0.1, 0.15, 0.2].map(|step| (seed, step))) {
+        let (mut side, machine) = pressed(predictive);
+        let mut machine = Bridged { machine, since: None, seed, reading: 0 };
+        run(&mut side, &mut machine, (0, 2000), Laying::Bead(flow(0.6)));
+        machine.since = Some(machine.machine.0.pressure());
+        let bead = Laying::Bead(flow(0.6 + step));
+        let commands = commanded(&mut side, &mut machine, (2000, 3500), bead, true);
+        let what = format!("step {step}, seed {seed}");
+        assert_eq!(side.state(), ExtruderState::Fault(ExtruderFault::NoPressureResponse), "{what}");
+        // After the first second, in which the screw turns fast for a moment.
+        let fastest = commands.iter().skip(200).copied().fold(0.0, f64::max);
+        assert!(fastest < 1.25 * (0.6 + step) / 0.02, "{what}: {fastest}");
+    }
+}
+
+/// A machine with a noisy sensor; from some moment on its pressure is constant.
+struct Bridged {
+    machine: Pressed,
+    since: Option<f64>,
+    seed: u64,
+    reading: u64,
+}
+
+impl Machine for Bridged {
+    fn advance(&mut self, command: Option<f64>) {
+        self.reading += 1;
+        self.machine.advance(command);
+    }
+
+    fn report(&self) -> ExtruderReport {
+        let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, self.reading]));
+        let truth = self.since.unwrap_or_else(|| self.machine.0.pressure());
+        ExtruderReport { pressure_mpa: MPa::new(truth + 0.007 * noise).ok(), ..report() }
+    }
+}
+
+/// A machine whose first reading is an outlier.
+struct FirstWrong(Pressed, bool);
+
+impl Machine for FirstWrong {
+    fn advance(&mut self, command: Option<f64>) {
+        self.1 = true;
+        self.0.advance(command);
+    }
+
+    fn report(&self) -> ExtruderReport {
+        let truth = self.0.report();
+        if self.1 { truth } else { ExtruderReport { pressure_mpa: MPa::new(2.0).ok(), ..truth } }
+    }
+}
+
+#[test]
+fn an_outlier_as_the_first_reading_of_a_bead_does_not_lift_the_pressure() {
+    let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap();
+    let (mut side, machine) = pressed(predictive);
+    let mut machine = FirstWrong(machine, false);
+    let mut highest = 0.0_f64;
+    for tick in 0..200 {
+        run(&mut side, &mut machine, (10 * tick, 10 * tick + 10), Laying::Bead(flow));
+        highest = highest.max(machine.0.0.pressure());
+    }
+    assert!(highest < 0.63, "{highest}");
+}
+
+#[test]
+fn a_hold_while_the_pressure_rises_neither_overshoots_nor_faults() {
+    let flow = PowerLaw::PP_GF28.flow(MPa::constant(0.6)).unwrap();
+    for begins in [20, 60, 80, 120, 160] {
+        for lasts in [45, 60, 100] {
+            let (mut side, mut machine) = pressed(predictive);
+            run(&mut side, &mut machine, (0, begins), Laying::Bead(flow));
+            let end = begins + lasts;
+            commanded(&mut side, &mut machine, (begins, end), Laying::Bead(flow), false);
+            let mut highest = 0.0_f64;
+            for tick in (end..end + 2500).step_by(10) {
+                run(&mut side, &mut machine, (tick, tick + 10), Laying::Bead(flow));
+                highest = highest.max(machine.0.pressure());
+            }
+            let what = format!("hold at {begins} for {lasts}: {highest}");
+            assert_eq!(side.state(), ExtruderState::Running, "{what}");
+            assert!(highest < 0.66, "{what}");
+            assert!((machine.0.pressure() - 0.6).abs() < 0.03, "{what}");
+        }
+    }
 }
 
 /// Reports are missing for half a second from several moments on: the command must resume from

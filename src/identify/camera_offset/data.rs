@@ -59,7 +59,7 @@ impl PooledWidths {
     pub fn ln_speeds(&self, offset_mm: f64) -> impl Iterator<Item = f64> {
         self.observations
             .iter()
-            .map(move |look| self.sums[look.bead].ln_speed(look.path_mm - offset_mm, self.gauge))
+            .map(move |look| self.sums[look.bead].ln_speed(look.middle_mm(offset_mm), self.gauge))
     }
 
     /// Means of the groups of a number for each width.

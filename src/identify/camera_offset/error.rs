@@ -1,7 +1,7 @@
 //! Why a bead does not determine the offset.
 
 use super::estimate::SpeedRange;
-use crate::core::Mm;
+use crate::core::{Mm, Span};
 
 /// Smallest number of widths. A choice.
 pub const MIN_WIDTHS: usize = 50;
@@ -85,6 +85,18 @@ pub enum CameraOffsetError {
         first: Mm,
         /// Another one.
         second: Mm,
+    },
+    /// The latency cannot be told from the offset.
+    #[error(
+        "the latency, {:.0} ± {:.0} ms, cannot be told from the offset: that needs frames at clearly \
+         different speeds; run once with longer steps of the speed, by 40 % or more",
+        1e3 * latency.secs(), 1e3 * sigma.secs()
+    )]
+    UncertainLatency {
+        /// The best.
+        latency: Span,
+        /// Its standard deviation.
+        sigma: Span,
     },
     /// The standard error is as large as the offset.
     #[error(

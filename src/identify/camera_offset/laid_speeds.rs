@@ -103,7 +103,7 @@ impl LaidSpeeds {
     /// Whether the speed is known and high enough over the whole gauge of a width at an offset
     /// \[mm\].
     pub fn covers(&self, look: &BeadObservation, offset_mm: f64, gauge: Mm) -> bool {
-        let middle = look.path_mm - offset_mm;
+        let middle = look.middle_mm(offset_mm);
         let half = 0.5 * gauge.get();
         self.beads.get(look.bead).is_some_and(|bead| bead.knows(middle - half, middle + half))
     }

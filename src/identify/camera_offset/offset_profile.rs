@@ -35,7 +35,7 @@ pub struct OffsetFit {
     /// Mean logarithm of the speed.
     mean_ln_speed: f64,
     /// Sum of the squared innovations.
-    sum_of_squares: f64,
+    pub sum_of_squares: f64,
     /// Sum of the squared innovations without an effect of the speed.
     sum_of_squares_constant: f64,
 }
@@ -148,7 +148,7 @@ impl OffsetProfile {
     }
 
     /// Variance of the innovations.
-    fn variance(&self, best: &OffsetFit) -> f64 {
+    pub fn variance(&self, best: &OffsetFit) -> f64 {
         best.sum_of_squares / (to_f64(self.widths.len()) - FITTED_PARAMETERS).max(1.0)
     }
 

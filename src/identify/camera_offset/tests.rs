@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::whiten::{PathPosition, PathWhitener};
 use super::*;
-use crate::core::{MmPerS, RobotMode};
+use crate::core::{MmPerS, RobotMode, Span};
 
 const GAUGE_MM: f64 = 60.0;
 const SEARCH: OffsetSearch =
@@ -325,4 +325,46 @@ fn innovations_of_a_drifting_series_are_independent_and_normalised() {
     for lag in [1, 2, 5, 20] {
         assert!(mean(lag).abs() < error, "lag {lag}: {}", mean(lag));
     }
+}
+
+/// A record whose frames are stamped late.
+fn late(seed: u64, by_ms: i64, plant: Plant) -> Record {
+    let mut record = steps(plant.seconds, seed).record(plant, seed);
+    for width in &mut record.widths {
+        width.at = width.at + Span::from_millis(by_ms);
+    }
+    record
+}
+
+#[test]
+fn latency_and_offset_are_told_apart_within_their_sigmas() {
+    const LATE_MS: f64 = 50.0;
+    let errors: Vec<(f64, f64)> = (0..60)
+        .into_par_iter()
+        .map(|seed| {
+            let record = late(seed, 50, Plant { seconds: 30, ..PLANT });
+            let found = find_with_latency(&record.states, &record.widths, SEARCH).unwrap();
+            let by_latency = (1e3 * found.latency.secs() - LATE_MS) / (1e3 * found.sigma.secs());
+            let by_offset =
+                (found.offset.offset.get() - PLANT.offset_mm) / found.offset.sigma.get();
+            (by_latency, by_offset)
+        })
+        .collect();
+    let (by_latency, by_offset): (Vec<f64>, Vec<f64>) = errors.into_iter().unzip();
+    for errors in [by_latency, by_offset] {
+        let within = errors.iter().filter(|z| z.abs() < 2.0).count();
+        assert!((51..=60).contains(&within), "{within} of 60: {errors:?}");
+    }
+}
+
+#[test]
+fn at_nearly_one_speed_the_latency_cannot_be_told_from_the_offset() {
+    let steps_at = [900, 2100, 3800, 5600, 6400, 8700, 9900, 12_100, 13_000];
+    let way = demands(30, |tick, _| {
+        let steps = steps_at.iter().filter(|at| **at < tick).count();
+        if steps % 2 == 0 { 100.0 } else { 96.0 }
+    });
+    let record = way.record(PLANT, 4);
+    let refused = find_with_latency(&record.states, &record.widths, SEARCH).unwrap_err();
+    assert!(matches!(refused, CameraOffsetError::UncertainLatency { .. }), "{refused}");
 }

@@ -1,20 +1,12 @@
 //! Beads that are laid live, over sockets, judged by what the robot did.
 
-use super::plant::{BAND_MM, Control, LoopCell, Plan, TARGET_MM};
-use super::steps::{
-    JUDGED_AFTER_START_MM, START_LIMITS_MM, STEP_AFTER_MM, STEP_RATIO, step_limits_mm,
-};
-use super::table::{CaseRow, Quantity, quantile};
+use super::plant::{LoopCell, START_MM, TARGET_MM};
+use super::steps::{STEP_AFTER_MM, STEP_RATIO};
 use crate::cell::file::Cell;
 use crate::core::{RobotMode, RobotState, Stamp};
-use crate::numeric::average::mean;
-use crate::numeric::number::to_f64;
 use crate::sim::bead_follower::{BeadFollower, BeadRecipe};
-use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
 
-/// Length of the first part of the bead, at the start speed \[mm\]: papers.md, "004".
-const START_MM: f64 = 200.0;
 /// Length of a bead \[mm\]. Derived: the first part, the longest setpoint period after it, and
 /// 1200 mm under control.
 pub const BEAD_MM: f64 = START_MM + 25.0 + 1200.0;
@@ -81,56 +73,6 @@ pub fn laid(cell: &Cell, states: &[(Stamp, RobotState)]) -> Option<LayerTrial> {
     None
 }
 
-/// Figures of one bead.
-#[derive(Debug, Clone, Copy)]
-pub struct LiveFigures {
-    start_mm: f64,
-    step_mm: f64,
-    mean_square: f64,
-}
-
-impl LiveFigures {
-    /// Of a bead in a cell.
-    pub fn of(cell: LoopCell, trial: &LayerTrial) -> Self {
-        let step_at_mm = START_MM + STEP_AFTER_MM;
-        let before = trial.until(step_at_mm);
-        let from_mm = trial.control_start_mm;
-        Self {
-            start_mm: before.smooth_settles_within(from_mm, f64::INFINITY, BAND_MM),
-            step_mm: trial.smooth_settles_within(step_at_mm, f64::INFINITY, BAND_MM),
-            mean_square: before.mean_square_over(cell.gauge_mm, from_mm + JUDGED_AFTER_START_MM),
-        }
-    }
-}
-
-/// The rows of a cell, from its beads.
-pub fn rows(cell: LoopCell, beads: &[LiveFigures]) -> Result<Vec<CaseRow>, ReproduceError> {
-    let starts: Vec<f64> = beads.iter().map(|bead| bead.start_mm).collect();
-    let steps: Vec<f64> = beads.iter().map(|bead| bead.step_mm).collect();
-    let pooled = mean(beads.iter().map(|bead| bead.mean_square)).sqrt();
-    let alone = Plan::new(cell, Control::Distance)?.roughness_over_gauge_mm();
-    let row = |case, quantity, value, required| {
-        CaseRow::new(cell, case, quantity, beads.len(), value, required)
-    };
-    let (median, most) = step_limits_mm(cell);
-    let late = |settled: &[f64], limit: f64| {
-        to_f64(settled.iter().filter(|mm| **mm > limit).count()) / to_f64(beads.len())
-    };
-    let (start, step) = ("live: 42 mm from 38.6", "live: flow +8 %");
-    Ok(vec![
-        row(start, Quantity::mm("settled, median"), quantile(&starts, 0.5), START_LIMITS_MM.0),
-        row(
-            start,
-            Quantity::ratio("fraction settled later"),
-            late(&starts, START_LIMITS_MM.1),
-            0.05,
-        ),
-        row(start, Quantity::ratio("RMS over roughness alone"), pooled / alone, 1.3),
-        row(step, Quantity::mm("settled, median"), quantile(&steps, 0.5), median),
-        row(step, Quantity::ratio("fraction settled later"), late(&steps, most), 0.05),
-    ])
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
@@ -141,6 +83,7 @@ mod tests {
     use crate::cell::file::Purpose;
     use crate::core::{Mm, MmPerS};
     use crate::studies::barjuei2022::scale;
+    use crate::studies::control::bead_figures::BeadFigures;
 
     fn parsed(cell: LoopCell) -> Cell {
         let text = cell_text(cell, "127.0.0.1:9", 7);
@@ -189,7 +132,7 @@ mod tests {
         };
         assert!((smooth(100.0) - 38.6).abs() < 0.1 && (smooth(500.0) - 42.0).abs() < 0.1);
         assert!((smooth(1000.0) / smooth(500.0) - STEP_RATIO).abs() < 1e-9);
-        let figures = LiveFigures::of(LoopCell::ALL[0], &trial);
+        let figures = BeadFigures::of(LoopCell::ALL[0], &trial);
         assert!(figures.start_mm < 5.0 && figures.step_mm.is_infinite(), "{figures:?}");
     }
 }

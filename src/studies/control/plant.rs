@@ -17,6 +17,8 @@ use crate::width_control::strategy::pi::PiStrategy;
 
 /// Target width \[mm\]: that of the nozzle, Shojaei Barjuei et al. 2022, section 3.2.
 pub const TARGET_MM: f64 = 42.0;
+/// Length of the first part of the bead, at the start speed \[mm\]: papers.md, "004".
+pub const START_MM: f64 = 200.0;
 /// Error within which a bead has its width \[mm\]: the paper's own band, section 5.
 pub const BAND_MM: f64 = 0.5;
 

@@ -9,7 +9,8 @@ use super::table::{CaseRow, Quantity};
 use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::pressure::{InitialState, PressureError};
 use crate::io::progress::Progress;
-use crate::numeric::average::{mean, standard_deviation};
+use crate::numeric::average::mean;
+use crate::numeric::estimate::Estimate;
 use crate::numeric::number::{to_count, to_f64};
 use crate::numeric::root::{BISECTIONS, bisect};
 use crate::sim::pressure::{Disturbances, LoadChange, SensorFaults, SimPressure, TICK_S};
@@ -37,9 +38,6 @@ const LIMITED_TO: f64 = 0.7;
 const LEVELS_10_BIT: f64 = 1024.0;
 /// Largest outlier \[MPa\]. Derived: more than three times the target.
 const OUTLIER_MPA: f64 = 2.0;
-/// Half of a confidence interval of 95 %, in standard deviations. Derived: the quantile of 97.5 % of
-/// a normal distribution.
-const NORMAL_95: f64 = 1.96;
 /// The loop's name in the table.
 const LOOP: &str = "pressure, 50/20 Hz";
 /// Change of speed that the screw does not follow \[rpm\]. Derived: 0.5 rpm of a screw with the 0.02
@@ -72,24 +70,9 @@ struct Figures {
     rest_range: f64,
 }
 
-/// Mean of a figure over the seeds, and half of its confidence interval of 95 %.
-#[derive(Debug, Clone, Copy)]
-struct Average {
-    mean: f64,
-    confidence: f64,
-}
-
-impl Average {
-    fn of(all: &[Figures], figure: impl Fn(&Figures) -> f64) -> Self {
-        let values: Vec<f64> = all.iter().map(figure).collect();
-        let sigma = if values.len() > 1 { standard_deviation(&values) } else { 0.0 };
-        let confidence = NORMAL_95 * sigma / to_f64(values.len()).sqrt();
-        Self { mean: mean(values.iter().copied()), confidence }
-    }
-
-    fn over(self, other: f64) -> Self {
-        Self { mean: self.mean / other, confidence: self.confidence / other }
-    }
+/// Mean of a figure over the seeds.
+fn mean_of(all: &[Figures], figure: impl Fn(&Figures) -> f64) -> Estimate {
+    Estimate::of(&all.iter().map(figure).collect::<Vec<f64>>())
 }
 
 fn noisy() -> Disturbances {
@@ -278,7 +261,7 @@ pub fn count() -> usize {
     cases().len()
 }
 
-fn row(case: &str, quantity: Quantity, seeds: usize, found: Average, required: f64) -> CaseRow {
+fn row(case: &str, quantity: Quantity, seeds: usize, found: Estimate, required: f64) -> CaseRow {
     CaseRow::new(LOOP, case, quantity, seeds, found.mean, required)
         .with_confidence(found.confidence)
 }
@@ -330,7 +313,7 @@ impl PressureCase {
     }
 
     fn judged(&self, ours: &[Figures], theirs: &[Figures]) -> Vec<CaseRow> {
-        let our = |figure: fn(&Figures) -> f64| Average::of(ours, figure);
+        let our = |figure: fn(&Figures) -> f64| mean_of(ours, figure);
         let their = |figure: fn(&Figures) -> f64| mean(theirs.iter().map(figure));
         let row =
             |quantity, found, required| row(&self.name, quantity, ours.len(), found, required);
@@ -339,27 +322,27 @@ impl PressureCase {
         vec![
             row(
                 Quantity::ratio("IAE of a step, over PI"),
-                our(|run| run.step_iae).over(step_iae),
+                our(|run| run.step_iae).times(1.0 / step_iae),
                 1.1,
             ),
             row(
                 Quantity::ratio("IAE of a load, over PI"),
-                our(|run| run.load_iae).over(their(|run| run.load_iae)),
+                our(|run| run.load_iae).times(1.0 / their(|run| run.load_iae)),
                 1.1,
             ),
             row(
                 Quantity::percent("overshoot"),
-                our(|run| run.overshoot).over(0.01),
+                our(|run| run.overshoot).times(100.0),
                 100.0 * overshoot,
             ),
             row(
                 Quantity::new("mean error at rest", "kPa"),
-                our(|run| run.rest_error).over(1e-3),
+                our(|run| run.rest_error).times(1e3),
                 7.0,
             ),
             row(
                 Quantity::ratio("range at rest, over PI"),
-                our(|run| run.rest_range).over(their(|run| run.rest_range)),
+                our(|run| run.rest_range).times(1.0 / their(|run| run.rest_range)),
                 1.1,
             ),
         ]

@@ -1,10 +1,16 @@
 //! A pump that pulsates.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use super::plant::{Control, LoopCell, Plan};
 use super::table::{CaseRow, Quantity, quantile};
+use crate::numeric::average::rms;
+use crate::numeric::number::{to_count, to_f64};
 use crate::studies::error::ReproduceError;
+use crate::trials::layer::LayerTrial;
+use crate::trials::score::BeadPoint;
+use crate::width_control::strategy::distance::DistanceStrategy;
 
 /// Length of the bead \[mm\].
 const LENGTH_MM: f64 = 3000.0;
@@ -19,6 +25,8 @@ const PERIODS_S: [f64; 7] = [0.6, 1.0, 1.3, 2.0, 3.5, 6.0, 10.0];
 const SPEED_MM_PER_S: f64 = 77.0;
 /// Setpoints in a period from which a pulsation can be cancelled.
 const MIN_SETPOINTS: f64 = 5.0;
+/// Distance between places at which speeds are compared \[mm\]: five reports of a robot at 77 mm/s.
+const SPEED_SPACING_MM: f64 = 7.7;
 /// Part of a pulsation that a mean over the gauge keeps, from which it is seen.
 const MIN_SEEN: f64 = 0.4;
 
@@ -27,7 +35,7 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
     let row = |case: &str, quantity, ratios: &[f64], fraction, required| {
         CaseRow::new(cell, case, quantity, ratios.len(), quantile(ratios, fraction), required)
     };
-    let mut rows = Vec::new();
+    let mut rows = steady_rows(cell, seeds)?;
     for period_s in PERIODS_S {
         let mut ratios = Vec::new();
         for amplitude in AMPLITUDES {
@@ -57,6 +65,40 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
         ));
     }
     Ok(rows)
+}
+
+/// A pump that does not pulsate: what the part that cancels costs.
+fn steady_rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let plan = Plan::new(cell, Control::Distance)?.long(LENGTH_MM);
+    let mut off = plan.clone();
+    if let Some(strategy) = off.run.control.strategy.as_kind::<DistanceStrategy>().copied() {
+        let strategy = DistanceStrategy { cancels_pulsation: false, ..strategy };
+        off.run.control.strategy = Arc::new(strategy);
+    }
+    let of = |trial: &LayerTrial| (trial.rms_error(JUDGED_FROM_MM), trial.score.speeds.clone());
+    let (with, without) = (plan.each(seeds, of)?, off.each(seeds, of)?);
+    let pairs = || with.iter().zip(&without);
+    let ratios: Vec<f64> = pairs().map(|(with, without)| with.0 / without.0).collect();
+    let added: Vec<f64> =
+        pairs().map(|(with, without)| speed_change(&with.1, &without.1)).collect();
+    let row = |quantity, value, required| {
+        CaseRow::new(cell, "no pulsation", quantity, with.len(), value, required)
+    };
+    Ok(vec![
+        row(Quantity::percent("speed added, RMS, 99 %"), 100.0 * quantile(&added, 0.99), 0.3),
+        row(Quantity::ratio("RMS over that without it, largest"), quantile(&ratios, 1.0), 1.02),
+    ])
+}
+
+/// Root mean square difference of two speeds over the path, as a fraction of the second.
+fn speed_change(with: &[BeadPoint], without: &[BeadPoint]) -> f64 {
+    let after = |speeds: &[BeadPoint], mm: f64| {
+        speeds.get(speeds.partition_point(|(path, _)| *path < mm)).map(|(_, speed)| *speed)
+    };
+    let points = to_count((LENGTH_MM - JUDGED_FROM_MM) / SPEED_SPACING_MM);
+    let places = (0..points).map(|point| JUDGED_FROM_MM + to_f64(point) * SPEED_SPACING_MM);
+    let changes = places.filter_map(|mm| Some(after(with, mm)? / after(without, mm)? - 1.0));
+    rms(changes)
 }
 
 fn ratios_of(

@@ -78,8 +78,8 @@ impl CaseRow {
     }
 
     /// With half of the confidence interval of its value.
-    pub fn with_confidence(self, confidence: f64) -> Self {
-        Self { confidence: Some(confidence), ..self }
+    pub fn with_confidence(self, confidence: Option<f64>) -> Self {
+        Self { confidence, ..self }
     }
 
     /// Whether the value is within what is required.

@@ -10,7 +10,7 @@ use crate::extruder::pressure::kalman::PressureNoise;
 use crate::extruder::pressure::pi::{PressurePi, PressurePiGains};
 use crate::extruder::pressure::predictive::PredictiveController;
 use crate::extruder::pressure::smith::SmithPi;
-use crate::extruder::pressure::tuning::Tuning;
+use crate::extruder::pressure::tuning::{LoopPeriods, Tuning};
 use crate::extruder::pressure::vsfc::{Vsfc, VsfcGains};
 use crate::extruder::pressure::{InitialState, PressureController, PressureError};
 use crate::sim::pressure::{Disturbances, GainWave, LoadChange, SimPressure};
@@ -111,7 +111,7 @@ impl TestedController {
                 Box::new(SmithPi::new(model, gains, 0.23, noise, limits, running))
             }
             Self::Predictive | Self::Previewed => {
-                let tuning = Tuning::of(&model, &noise);
+                let tuning = Tuning::of(&model, &noise, LoopPeriods::MA_2026);
                 Box::new(PredictiveController::new(model, tuning, limits, running))
             }
         })

@@ -113,7 +113,17 @@ mod tests {
 
     fn row(published: Option<f64>, simulated: Option<f64>) -> TableRow {
         let (paper, case, quantity) = ("ma2026", "step".to_owned(), "overshoot");
-        TableRow { paper, case, quantity, unit: "%", published, simulated, ours: None }
+        TableRow {
+            paper,
+            case,
+            quantity,
+            unit: "%",
+            published,
+            simulated,
+            ours: None,
+            simulated_confidence: None,
+            ours_confidence: None,
+        }
     }
 
     #[test]

@@ -14,19 +14,34 @@ pub fn plain(rows: &[TableRow]) -> String {
     let case_width = longest(|row| &row.case, 4);
     let quantity_width = longest(|row| row.quantity, 8);
     let unit_width = longest(|row| row.unit, 4);
+    let values: Vec<[String; 3]> = rows.iter().map(values).collect();
+    let value_width = values.iter().flatten().map(|value| value.chars().count()).max();
+    let value_width = value_width.unwrap_or(0).max(9);
     let line = |cells: [&str; 6]| {
         let [case, quantity, unit, published, simulated, ours] = cells;
         format!(
             "{case:case_width$}  {quantity:quantity_width$}  {unit:unit_width$} {published:>9} \
-             {simulated:>9} {ours:>9}\n"
+             {simulated:>value_width$} {ours:>value_width$}\n"
         )
     };
     let mut text = line(HEADS);
-    for row in rows {
-        let [published, simulated, ours] = [row.published, row.simulated, row.ours].map(number);
-        text += &line([&row.case, row.quantity, row.unit, &published, &simulated, &ours]);
+    for (row, [published, simulated, ours]) in rows.iter().zip(&values) {
+        text += &line([&row.case, row.quantity, row.unit, published, simulated, ours]);
     }
     text
+}
+
+/// Published, simulated and ours, each with its confidence.
+fn values(row: &TableRow) -> [String; 3] {
+    let with = |value: Option<f64>, confidence: Option<f64>| match confidence {
+        Some(half) => format!("{} ± {}", number(value), number(Some(half))),
+        None => number(value),
+    };
+    [
+        number(row.published),
+        with(row.simulated, row.simulated_confidence),
+        with(row.ours, row.ours_confidence),
+    ]
 }
 
 /// The rows as HTML.
@@ -41,9 +56,7 @@ pub fn markup(rows: &[TableRow]) -> Markup {
                 td { (row.case) }
                 td { (row.quantity) }
                 td { (row.unit) }
-                @for value in [row.published, row.simulated, row.ours] {
-                    td.number { (number(value)) }
-                }
+                @for value in values(row) { td.number { (value) } }
             } } }
         }
     }
@@ -97,6 +110,8 @@ mod tests {
             published: Some(1.3),
             simulated: Some(1.46),
             ours: None,
+            simulated_confidence: Some(0.02),
+            ours_confidence: None,
         };
         let text = plain(&[row("a", quantity), row("a longer case", "short")]);
         let ends: Vec<usize> = text.lines().map(|line| line.chars().count()).collect();

@@ -13,12 +13,13 @@ use crate::core::Mm;
 #[command(after_help = "\
 Examples:
   truebead camera offset runs/first/recording.mcap
+  truebead camera offset steps/recording.mcap --latency
   truebead camera offset touch.png --cell my-cell.toml --board 9x6 --square-mm 20 --nozzle-at -1,-1
 
 From a recording: each width is of bead that was laid one offset further back, at
 the speed that the robot had there. The speed must have changed clearly while
 bead was laid; one run with some steps of the target width or of the speed is
-enough.
+enough. With --latency the time from a frame's capture to its stamp is found too.
 
 From an image: lay a board on the bed so that the camera sees it and it reaches
 under the nozzle. Let the nozzle touch it, give its position in squares from the first
@@ -39,6 +40,10 @@ pub struct OffsetArgs {
     /// [default: 1000]
     #[arg(long, value_name = "MM", value_parser = parse_length)]
     pub max_mm: Option<Mm>,
+    /// Recording: find the camera's latency as well, for frames that carry no time of
+    /// capture
+    #[arg(long)]
+    pub latency: bool,
     #[command(flatten)]
     pub board: OptionalBoard,
     /// Image: where the nozzle touches the board, in squares from its first inner

@@ -8,9 +8,10 @@ use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::camera_offset::{gauge, max_offset};
 use crate::cli::recorded::{attached_cell, open, warn_of_damage};
-use crate::core::Mm;
+use crate::core::{Mm, Span};
 use crate::identify::camera_offset::{
-    EXPONENT_RANGE, OffsetEstimate, OffsetSearch, SpeedRange, find,
+    EXPONENT_RANGE, LatencyEstimate, OffsetEstimate, OffsetSearch, SpeedRange, find,
+    find_with_latency,
 };
 use crate::report::offset::{RecordedBead, recorded_bead};
 
@@ -29,14 +30,41 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let recorded = recorded_bead(&mut recording).context("the recording cannot be read on")?;
     warn_of_damage(&recording);
     let gauge = gauge(&cell, &calibration, &recorded.states)?;
-    let found = find(&recorded.states, &recorded.widths, OffsetSearch { gauge, max_offset })
+    let search = OffsetSearch { gauge, max_offset };
+    let camera = cell.run.as_ref().map(|run| &run.camera);
+    let now = camera.map(|camera| camera.offset);
+    if args.latency {
+        let found = find_with_latency(&recorded.states, &recorded.widths, search)
+            .with_context(|| format!("{name} does not determine offset and latency"))?;
+        let in_run = camera.map_or(Span::ZERO, |camera| camera.latency);
+        answer(&found.offset, &recorded, gauge);
+        tell_latency(&found, in_run);
+        tell(found.offset.offset.get(), found.offset.sigma.get(), now);
+        say!("latency_ms = {:.0}", ms(in_run + found.latency).max(0.0));
+        return Ok(());
+    }
+    let found = find(&recorded.states, &recorded.widths, search)
         .with_context(|| format!("{name} does not determine the offset"))?;
-    let now = cell.run.as_ref().map(|run| run.camera.offset);
-    answer(&found, &recorded, gauge, now);
+    answer(&found, &recorded, gauge);
+    tell(found.offset.get(), found.sigma.get(), now);
     Ok(())
 }
 
-fn answer(found: &OffsetEstimate, print: &RecordedBead, gauge: Mm, now: Option<Mm>) {
+/// Prints a latency, given the one that the recorded times of capture contain already.
+fn tell_latency(found: &LatencyEstimate, in_run: Span) {
+    let latency = ms(in_run + found.latency);
+    say!(
+        "latency    {latency:.1} ± {:.1} ms from a frame's capture to its time stamp; {:.0} in the run",
+        ms(found.sigma),
+        ms(in_run)
+    );
+}
+
+fn ms(span: Span) -> f64 {
+    1e3 * span.secs()
+}
+
+fn answer(found: &OffsetEstimate, print: &RecordedBead, gauge: Mm) {
     let SpeedRange { min: from, max: to } = found.speeds;
     let (offset, sigma) = (found.offset.get(), found.sigma.get());
     say!("offset     {offset:.2} ± {sigma:.2} mm from the nozzle to the middle of the gauge");
@@ -56,5 +84,4 @@ fn answer(found: &OffsetEstimate, print: &RecordedBead, gauge: Mm, now: Option<M
         100.0 * found.residual_rms
     );
     say!("gauge      {:.1} mm long", gauge.get());
-    tell(offset, sigma, now);
 }

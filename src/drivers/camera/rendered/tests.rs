@@ -15,6 +15,7 @@ const SMOOTH_STEADY: Simulation = Simulation {
     step: Span::from_millis(20),
     report: Span::from_millis(20),
     latency: Span::ZERO,
+    stamp_delay: Span::ZERO,
     robot_bandwidth_hz: 10.0,
     random_phase: false,
     gauge_length: Mm::ZERO,
@@ -58,6 +59,7 @@ fn camera() -> (RenderedCamera, RobotView, Sender<()>) {
         mount: Mount::Flange,
         offset: Mm::constant(90.0),
         offset_sigma: Mm::constant(8.0),
+        latency: Span::ZERO,
         deadline: Span::from_millis(2000),
     };
     let scale = Calibration::Scale { mm_per_px: 0.1, sigma: None };
