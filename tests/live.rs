@@ -108,6 +108,16 @@ fn same_widths(run: &Path, again: &Path) {
 }
 
 #[test]
+fn a_simulation_of_widths_replays_with_its_own_gauge() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut simulate = truebead();
+    simulate.args(["simulate", "cells/distance.toml", "--record", "--out"]).arg(&out);
+    assert!(simulate.status().unwrap().success());
+    assert!(replay(&out.join("recording.mcap")).contains("all the same bit for bit"));
+}
+
+#[test]
 fn a_killed_run_leaves_all_but_the_last_second() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("demo");

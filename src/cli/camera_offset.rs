@@ -20,12 +20,16 @@ pub fn max_offset(max: Option<Mm>) -> Result<Mm, WrongArguments> {
     Ok(farthest)
 }
 
-/// Length of the gauge on the surface during the run.
+/// Length of the gauge on the surface during the run, or that of the simulation if no frames were
+/// rendered.
 pub fn gauge(
     cell: &Cell,
     calibration: &Calibration,
     states: &[(Stamp, RobotState)],
 ) -> anyhow::Result<Mm> {
+    if cell.simulates_widths() {
+        return Ok(cell.gauge_length(calibration));
+    }
     // After the bead the robot may lift the camera: only heights during the bead count.
     let laying = states.iter().filter(|(_, state)| state.mode.lays_bead());
     let mut heights: Vec<f64> = laying.map(|(_, state)| state.z_mm.get()).collect();

@@ -80,6 +80,7 @@ pub fn live(
     let log = log(&loaded, folders.log, title, header, control)?;
     let record = RecordConfig {
         frames: loaded.cell.recording.frames,
+        is_live: true,
         epoch_ns: clock.epoch_unix_ns(),
         cell_name: loaded.path.display().to_string(),
         cell_text: loaded.text.clone(),

@@ -50,7 +50,10 @@ pub fn attached_cell(
         refuse!("{file}: the attachment cell.toml is missing");
     };
     let name = format!("cell.toml in {file}");
-    let cell = Cell::parse(Path::new(&name), text, purpose)?.live();
+    let mut cell = Cell::parse(Path::new(&name), text, purpose)?;
+    if recording.run().is_some_and(|run| run.is_live) {
+        cell = cell.live();
+    }
     let calibration = match &cell.calibration {
         CalibrationSource::Scale { mm_per_px, sigma } => {
             Calibration::Scale { mm_per_px: *mm_per_px, sigma: *sigma }

@@ -29,6 +29,7 @@ impl SimRecorder {
         let Some(folder) = folder else { return Ok(Self(None)) };
         let config = RecordConfig {
             frames: KeepFrames::None,
+            is_live: false,
             epoch_ns: 0,
             cell_name: loaded.path.display().to_string(),
             cell_text: loaded.text.clone(),

@@ -78,6 +78,7 @@ fn start_with<S: Sink + 'static>(
     let run = RunInfo {
         format_version: FORMAT_VERSION,
         program_version: PROGRAM_VERSION.to_owned(),
+        is_live: config.is_live,
         epoch_ns: config.epoch_ns,
         cell_name: config.cell_name.clone(),
     };

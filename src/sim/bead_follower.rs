@@ -18,7 +18,7 @@ const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 /// move.
 const PATH_TOLERANCE_MM: f64 = 0.01;
 
-/// Reports that are kept: 2.5 s at 50 Hz, more than a frame is late.
+/// Reports that are kept. Derived: 2.5 s at 50 Hz, more than a frame is late.
 const MAX_REPORTS: usize = 128;
 
 /// Parameters of every bead.

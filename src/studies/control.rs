@@ -94,7 +94,7 @@ mod tests {
         assert!(rows.len() > 150, "{}", rows.len());
         let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
         // PI control itself needs 0.8 MPa·s in most of them: plants that are slow in two ways.
-        let is_known = |row: &&CaseRow| row.quantity == "IAE of a step, over PI";
+        let is_known = |row: &&CaseRow| row.quantity == "IAE of a step, over PI or 0.8";
         assert!(missed.iter().all(is_known) && missed.len() <= 10, "{missed:#?}");
         let alone =
             missed.iter().filter(|row| !row.case.contains("lag") || !row.case.contains(','));

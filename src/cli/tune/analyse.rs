@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Context;
 
 use crate::assembly::LoadedCell;
+use crate::cell::Cell;
 use crate::cell::file::Purpose;
 use crate::cli::camera_offset::gauge;
 use crate::cli::recorded::{attached_cell, open, warn_of_damage};
@@ -17,6 +18,20 @@ use crate::tune::{IdentifiedCell, Log, TuneFacts};
 /// the recorded speeds are not made.
 const MAX_SPEED_BEYOND_LIMITS: f64 = 3.0;
 
+/// Warns where a recording was made with another latency of the camera: the offset that is found
+/// contains the difference.
+fn warn_of_latency(recorded: &Cell, cell: &Cell) {
+    let latency_ms =
+        |cell: &Cell| cell.run.as_ref().map_or(0.0, |run| 1e3 * run.camera.latency.secs());
+    let (then, now) = (latency_ms(recorded), latency_ms(cell));
+    if then != now {
+        tell!(
+            "warning: the recording was made with latency_ms = {then}, the cell has {now}: the offset \
+             that is found belongs to the former"
+        );
+    }
+}
+
 /// Identifies a cell from a recording and proposes its settings. Fails if the recording does not
 /// determine the cell.
 pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<Tuned> {
@@ -27,6 +42,7 @@ pub fn tuned(path: &Path, loaded: &LoadedCell, farthest: Mm) -> anyhow::Result<T
     // The gauge is that of the recorded run; the cell file may have changed since.
     let (cell, calibration) = attached_cell(&recording, Purpose::Run)
         .unwrap_or_else(|_| (loaded.cell.clone(), loaded.calibration.clone()));
+    warn_of_latency(&cell, &loaded.cell);
     let gauge = gauge(&cell, &calibration, &log.states)?;
     let run = loaded.cell.run.as_ref().context("the cell was not read for a run")?;
     let facts = TuneFacts { gauge, max_offset: farthest, start_speed: run.robot.start_speed };

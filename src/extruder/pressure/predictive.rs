@@ -39,9 +39,11 @@ const BOUNDED_FOR: f64 = 1.0;
 const ANSWER_WITHIN: f64 = 5.0;
 /// The same since the model, with the screw's limits, predicts an answer. Derived: less the dead time.
 const ANSWER_SINCE_ASKED: f64 = 4.0;
-/// Shortest such time \[s\]: a plant may be much quicker than its readings.
+/// Shortest such time \[s\]: a plant may be much quicker than its readings. Derived: fifty of them in
+/// the loop of Ma et al. 2026.
 const MIN_ANSWER_S: f64 = 1.0;
-/// Longest time between two commands that counts \[s\].
+/// Longest time between two commands that counts \[s\]. Derived: twenty periods of Ma et al. 2026;
+/// a longer one is a stall.
 const MAX_PERIOD_S: f64 = 1.0;
 /// Dead times that are looked back. Derived: twice that of the model, and some.
 const LOOK_BACK: f64 = 2.5;

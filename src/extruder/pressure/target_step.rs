@@ -23,9 +23,10 @@ const NEARLY_WHOLE: f64 = 0.8;
 /// four of the difference of a filtered reading, 0.58, and a slow average, 0.2.
 const MIN_ANSWER_SIGMAS: f64 = 2.5;
 /// Change that the model predicts from which the lack of an answer is a fault, in standard deviations
-/// of a reading: the answer of a plant with a third of the gain would still count.
+/// of a reading. Derived: the answer of a plant with a third of the gain would still count.
 const MIN_ASKED_SIGMAS: f64 = 8.0;
-/// Change of the measured pressure over the predicted one within which it stands still.
+/// Change of the measured pressure over the predicted one within which it stands still. Derived: half
+/// the gain would have answered.
 const STANDS_STILL: f64 = 0.5;
 
 /// Pressures of the model and of the sensor \[MPa\].

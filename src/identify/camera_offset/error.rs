@@ -1,7 +1,7 @@
 //! Why a bead does not determine the offset.
 
 use super::estimate::SpeedRange;
-use crate::core::{Mm, Span};
+use crate::core::Mm;
 
 /// Smallest number of widths. A choice.
 pub const MIN_WIDTHS: usize = 50;
@@ -88,16 +88,11 @@ pub enum CameraOffsetError {
     },
     /// The latency cannot be told from the offset.
     #[error(
-        "the latency, {:.0} ± {:.0} ms, cannot be told from the offset: that needs frames at clearly \
-         different speeds; run once with longer steps of the speed, by 40 % or more",
-        1e3 * latency.secs(), 1e3 * sigma.secs()
+        "latency and offset cannot be told apart: that needs frames at clearly different speeds, and a \
+         gauge that is known; run once with larger steps of the speed, as with \
+         `truebead tune CELL --step-fraction 0.2`"
     )]
-    UncertainLatency {
-        /// The best.
-        latency: Span,
-        /// Its standard deviation.
-        sigma: Span,
-    },
+    UncertainLatency,
     /// The standard error is as large as the offset.
     #[error(
         "{:.1} ± {:.1} mm is no answer: run once with larger or more abrupt steps of the target \

@@ -9,6 +9,8 @@ use crate::cell::file::KeepFrames;
 pub struct RecordConfig {
     /// Which frames are kept.
     pub frames: KeepFrames,
+    /// Whether frames were measured live, whatever the cell says of a simulation.
+    pub is_live: bool,
     /// Wall-clock time at stamp 0 \[ns since 1970\].
     pub epoch_ns: u64,
     /// Path of the cell file in the command.

@@ -74,6 +74,8 @@ pub struct RunInfo {
     pub format_version: u32,
     /// Version of the program that recorded it.
     pub program_version: String,
+    /// Whether frames were measured live, and not by `simulate`.
+    pub is_live: bool,
     /// Wall-clock time at stamp 0 \[ns since 1970\].
     pub epoch_ns: u64,
     /// Path of the cell file in the command.
@@ -87,6 +89,7 @@ impl RunInfo {
             ("format_version", self.format_version.to_string()),
             ("program", "truebead".to_string()),
             ("program_version", self.program_version.clone()),
+            ("live", self.is_live.to_string()),
             ("epoch_ns", self.epoch_ns.to_string()),
             ("cell_file", self.cell_name.clone()),
         ]
@@ -105,6 +108,8 @@ impl RunInfo {
         Ok(Some(Self {
             format_version: text("format_version")?.parse().map_err(|_| "format_version")?,
             program_version: text("program_version")?,
+            // A recording of before has no such key; what it says of its cell held for both.
+            is_live: map.get("live").is_some_and(|live| live == "true"),
             epoch_ns: text("epoch_ns")?.parse().map_err(|_| "epoch_ns")?,
             cell_name: text("cell_file")?,
         }))

@@ -20,6 +20,7 @@ const EPOCH_NS: u64 = 1_763_683_200_000_000_000;
 fn config() -> RecordConfig {
     RecordConfig {
         frames: KeepFrames::Every(1),
+        is_live: true,
         epoch_ns: EPOCH_NS,
         cell_name: "cells/a.toml".into(),
         cell_text: "[control]\ntarget_width_mm = 42.0\n".into(),

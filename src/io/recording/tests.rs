@@ -20,6 +20,7 @@ fn record(events: u64, text: usize) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let config = RecordConfig {
         frames: KeepFrames::Every(1),
+        is_live: true,
         epoch_ns: 1_700_000_000_000_000_000,
         cell_name: "cell.toml".into(),
         cell_text: "a = 1\n".into(),

@@ -6,8 +6,8 @@ use crate::core::{Span, Stamp};
 /// Longest wait for a width, as a fraction of the time between two widths. Derived: of the last
 /// width and the next one, the setpoint takes the nearer.
 const MAX_WAIT_OF_INTERVAL: f64 = 0.5;
-/// Longest wait for a width, as a fraction of the setpoint's period: the rate at the robot hardly
-/// varies.
+/// Longest wait for a width, as a fraction of the setpoint's period. Derived: a setpoint is late by a
+/// quarter of its period at most.
 const MAX_WAIT_OF_PERIOD: f64 = 0.25;
 
 /// The setpoints' grid, and the widths' arrivals.

@@ -25,7 +25,7 @@ pub struct BeadFigures {
 }
 
 impl BeadFigures {
-    /// Of a bead in a cell, whose flow steps [`STEP_AFTER_MM`] after the start.
+    /// Of a bead in a cell, whose flow steps 600 mm after the start.
     pub fn of(cell: LoopCell, trial: &LayerTrial) -> Self {
         let step_at_mm = START_MM + STEP_AFTER_MM;
         let before = trial.until(step_at_mm);

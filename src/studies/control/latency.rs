@@ -21,16 +21,17 @@ use crate::studies::barjuei2022::scale;
 use crate::studies::error::ReproduceError;
 use crate::width_control::strategy::steps::StepsStrategy;
 
-/// How late a frame is stamped: the example of an HTTP snapshot, 5 mm of path at 100 mm/s.
+/// How late a frame is stamped. Derived: 5 mm of path at 100 mm/s, as of an HTTP snapshot.
 const DELAY: Span = Span::from_millis(50);
 /// Steps of the speed, as a fraction of the start speed: of the paper's limits of 60 and 150 mm/s
 /// (Shojaei Barjuei et al. 2022) at 112.5 mm/s the largest that `steps` takes.
 const STEP_FRACTION: f64 = 0.3;
 /// Its name in the table.
 const CIRCUMSTANCE: &str = "camera 50 ms late";
-/// Length of a bead after the step of the flow \[mm\].
+/// Length of a bead after the step of the flow \[mm\]. Derived: as much as before it.
 const AFTER_STEP_MM: f64 = 600.0;
-/// Largest offset that is tried, in offsets.
+/// Largest offset that is tried, in offsets. Derived: a cell whose offset is not known at all has to
+/// try much more, but not to answer otherwise.
 const SEARCHED_RATIO: f64 = 3.0;
 
 /// The rows of a cell.

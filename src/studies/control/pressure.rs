@@ -321,7 +321,7 @@ impl PressureCase {
         let overshoot = if self.is_limited { 0.05 } else { 0.30 };
         vec![
             row(
-                Quantity::ratio("IAE of a step, over PI"),
+                Quantity::ratio("IAE of a step, over PI or 0.8"),
                 our(|run| run.step_iae).times(1.0 / step_iae),
                 1.1,
             ),

@@ -25,7 +25,8 @@ const PERIODS_S: [f64; 7] = [0.6, 1.0, 1.3, 2.0, 3.5, 6.0, 10.0];
 const SPEED_MM_PER_S: f64 = 77.0;
 /// Setpoints in a period from which a pulsation can be cancelled.
 const MIN_SETPOINTS: f64 = 5.0;
-/// Distance between places at which speeds are compared \[mm\]: five reports of a robot at 77 mm/s.
+/// Distance between places at which speeds are compared \[mm\]. Derived: five reports, 20 ms apart, of
+/// a robot at 77 mm/s.
 const SPEED_SPACING_MM: f64 = 7.7;
 /// Part of a pulsation that a mean over the gauge keeps, from which it is seen.
 const MIN_SEEN: f64 = 0.4;

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use crate::numeric::number::to_count;
 use crate::studies::study::TableRow;
 
 const HEADS: [&str; 6] = ["case", "quantity", "unit", "published", "simulated", "ours"];
@@ -34,7 +35,7 @@ pub fn plain(rows: &[TableRow]) -> String {
 /// Published, simulated and ours, each with its confidence.
 fn values(row: &TableRow) -> [String; 3] {
     let with = |value: Option<f64>, confidence: Option<f64>| match confidence {
-        Some(half) => format!("{} ± {}", number(value), number(Some(half))),
+        Some(half) => format!("{} ± {}", number(value), two_digits(half)),
         None => number(value),
     };
     [
@@ -60,6 +61,12 @@ pub fn markup(rows: &[TableRow]) -> Markup {
             } } }
         }
     }
+}
+
+/// A positive number with two digits that count.
+fn two_digits(value: f64) -> String {
+    let places = to_count((1.0 - value.log10().floor()).clamp(0.0, 9.0));
+    format!("{value:.places$}")
 }
 
 /// A number with one digit after the point from 20 on, with two from 0.2 on, with four from 0.002
@@ -90,6 +97,12 @@ mod tests {
         assert_eq!(number(Some(-1e-13)), "0.00");
         assert_eq!(number(Some(-0.01)), "-0.0100");
         assert_eq!(number(None), "–");
+    }
+
+    #[test]
+    fn a_confidence_has_two_digits_that_count() {
+        assert_eq!([0.1321, 0.0019, 12.3, 0.5].map(two_digits), ["0.13", "0.0019", "12", "0.50"]);
+        assert_eq!(two_digits(0.0), "0.000000000");
     }
 
     #[test]

@@ -19,12 +19,15 @@ use crate::report::offset::{RecordedBead, recorded_bead};
 pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     let max_offset = max_offset(args.max_mm)?;
     let mut recording = open(&args.input)?;
+    let recorded_cell = attached_cell(&recording, Purpose::Measure);
+    let in_run = recorded_cell.as_ref().ok().and_then(|(cell, _)| cell.run.as_ref());
+    let in_run = in_run.map_or(Span::ZERO, |run| run.camera.latency);
     let (cell, calibration) = match &args.cell {
         Some(path) => {
             let loaded = LoadedCell::read(path, Purpose::Measure)?;
             (loaded.cell, loaded.calibration)
         }
-        None => attached_cell(&recording, Purpose::Measure)?,
+        None => recorded_cell?,
     };
     let name = args.input.display().to_string();
     let recorded = recorded_bead(&mut recording).context("the recording cannot be read on")?;
@@ -36,7 +39,6 @@ pub fn run(args: &OffsetArgs) -> anyhow::Result<()> {
     if args.latency {
         let found = find_with_latency(&recorded.states, &recorded.widths, search)
             .with_context(|| format!("{name} does not determine offset and latency"))?;
-        let in_run = camera.map_or(Span::ZERO, |camera| camera.latency);
         answer(&found.offset, &recorded, gauge);
         tell_latency(&found, in_run);
         tell(found.offset.offset.get(), found.offset.sigma.get(), now);

@@ -90,6 +90,7 @@ fn a_recording_gives_its_frames_back_with_their_times_and_heights() {
     let folder = tempfile::tempdir().unwrap();
     let config = RecordConfig {
         frames: KeepFrames::Every(1),
+        is_live: true,
         epoch_ns: 1_700_000_000_000_000_000,
         cell_name: "cell.toml".into(),
         cell_text: String::new(),
