@@ -339,11 +339,14 @@ fn late(seed: u64, by_ms: i64, plant: Plant) -> Record {
 #[test]
 fn latency_and_offset_are_told_apart_within_their_sigmas() {
     const LATE_MS: f64 = 50.0;
-    let errors: Vec<(f64, f64)> = (0..60)
+    // A roughness of 0.25 % and 5 mm, as a mean over the gauge.
+    let plant = Plant { wander: (1e-3, 20.0), picture: 2e-4, seconds: 20, ..PLANT };
+    let near = OffsetSearch { max_offset: Mm::constant(300.0), ..SEARCH };
+    let errors: Vec<(f64, f64)> = (0..24)
         .into_par_iter()
         .map(|seed| {
-            let record = late(seed, 50, Plant { seconds: 30, ..PLANT });
-            let found = find_with_latency(&record.states, &record.widths, SEARCH).unwrap();
+            let record = late(seed, 50, plant);
+            let found = find_with_latency(&record.states, &record.widths, near).unwrap();
             let by_latency = (1e3 * found.latency.secs() - LATE_MS) / (1e3 * found.sigma.secs());
             let by_offset =
                 (found.offset.offset.get() - PLANT.offset_mm) / found.offset.sigma.get();
@@ -353,7 +356,7 @@ fn latency_and_offset_are_told_apart_within_their_sigmas() {
     let (by_latency, by_offset): (Vec<f64>, Vec<f64>) = errors.into_iter().unzip();
     for errors in [by_latency, by_offset] {
         let within = errors.iter().filter(|z| z.abs() < 2.0).count();
-        assert!((51..=60).contains(&within), "{within} of 60: {errors:?}");
+        assert!(within >= 20, "{within} of 24: {errors:?}");
     }
 }
 
