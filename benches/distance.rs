@@ -3,8 +3,12 @@
 
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
 use divan::Bencher;
 use truebead::core::{Mm, MmPerS, Span, Stamp};
+use truebead::sim::hash;
 use truebead::width_control::bead_noise::BeadRoughness;
 use truebead::width_control::controller::BeadReport;
 use truebead::width_control::distance::{DistanceController, DistanceSettings, WidthReading};
@@ -13,22 +17,31 @@ use truebead::width_control::response::{ResponseSettings, ResponseTest};
 const FRAME_S: f64 = 0.02;
 
 const OFFSET: Mm = Mm::constant(88.4);
+const OFFSET_SIGMA: Mm = Mm::constant(8.8);
 const GAUGE: Mm = Mm::constant(12.7);
 const START_SPEED: MmPerS = MmPerS::constant(112.5);
+const TARGET: Mm = Mm::constant(42.0);
 const ROUGHNESS: BeadRoughness = BeadRoughness { ratio: 0.0025, length_mm: 5.0 };
+const PERIOD_S: f64 = 3.0;
 
-/// Control that is under way on a bead whose flow pulsates.
+/// Control that is under way, of a robot that has its commanded speed at once.
 struct Running {
     controller: DistanceController,
     response: ResponseTest,
+    /// Amplitude of the flow's pulsation.
+    amplitude: f64,
     count: u32,
+    path_mm: f64,
+    speed: f64,
+    /// Path and ln w of the bead as far as the camera sees it.
+    laid: VecDeque<(f64, f64)>,
 }
 
 impl Running {
-    fn new() -> Self {
+    fn new(amplitude: f64) -> Self {
         let controller = DistanceController::new(DistanceSettings {
             offset: OFFSET,
-            offset_sigma: Mm::constant(8.8),
+            offset_sigma: OFFSET_SIGMA,
             gauge: GAUGE,
             reference_speed: START_SPEED,
             exponent: 0.25,
@@ -39,39 +52,63 @@ impl Running {
         });
         let response = ResponseTest::new(ResponseSettings {
             offset: OFFSET,
+            offset_sigma: OFFSET_SIGMA,
             gauge: GAUGE,
             reference_speed: START_SPEED,
             roughness: ROUGHNESS,
         });
-        let mut running = Self { controller, response, count: 0 };
+        let (speed, laid) = (START_SPEED.get(), VecDeque::new());
+        let mut running =
+            Self { controller, response, amplitude, count: 0, path_mm: 0.0, speed, laid };
         for _ in 0..1500 {
             running.step();
         }
         running
     }
 
+    /// The bead that is laid in this step, and the one that the camera sees.
+    fn lay(&mut self, at: f64) -> Option<WidthReading> {
+        self.path_mm += self.speed * FRAME_S;
+        let [rough, _] = hash::normal_pair(hash::mix(&[u64::from(self.count)]));
+        let flow = self.amplitude * (TAU * at / PERIOD_S).sin() + ROUGHNESS.ratio * rough;
+        let ln_width = TARGET.get().ln() + flow - 0.221 * (self.speed / 80.0).ln();
+        self.laid.push_back((self.path_mm, ln_width));
+        let from = self.path_mm - OFFSET.get() - 0.5 * GAUGE.get();
+        while self.laid.front().is_some_and(|(path, _)| *path < from) {
+            self.laid.pop_front();
+        }
+        let seen = self.laid.iter().take_while(|(path, _)| *path < from + GAUGE.get());
+        let (count, sum) = seen.fold((0.0, 0.0), |(count, sum), (_, one)| (count + 1.0, sum + one));
+        let is_under_camera = self.path_mm > OFFSET.get() + GAUGE.get();
+        let width = Mm::new((sum / count).exp()).ok().filter(|_| is_under_camera)?;
+        Some(WidthReading { width, sigma: Mm::constant(0.003) })
+    }
+
     fn step(&mut self) -> Option<MmPerS> {
         self.count += 1;
         let at = f64::from(self.count) * FRAME_S;
-        let speed = 80.0 + 2.0 * (0.7 * at).sin();
-        let path = Mm::new(80.0 * at - 2.857 * (0.7 * at).cos()).expect("finite");
+        let reading = self.lay(at);
         let now = Stamp::from_secs(at);
-        let speed = MmPerS::new(speed).expect("finite");
+        let (path, speed) = (Mm::new(self.path_mm), MmPerS::new(self.speed));
+        let (path, speed) = (path.expect("finite"), speed.expect("finite"));
         self.controller.reported(now, path, speed, 1.0);
         self.response.reported(&BeadReport { at: now, path, speed, flow_ratio: 1.0 });
-        let width = Mm::new(42.0 + 0.8 * (2.1 * at).sin()).expect("finite");
-        let reading = WidthReading { width, sigma: Mm::constant(0.36) };
-        let target = Mm::constant(42.0);
-        let _ = self.controller.measured(path, reading);
-        let _ = self.response.measured(path, reading, target);
-        self.controller.speed(target, now, Span::from_millis(50))
+        if let Some(reading) = reading {
+            let _ = self.controller.measured(path, reading);
+            let _ = self.response.measured(path, reading, TARGET);
+        }
+        let commanded = self.controller.speed(TARGET, now, Span::from_millis(50));
+        if let Some(commanded) = commanded {
+            self.speed = commanded.get().clamp(60.0, 150.0);
+        }
+        commanded
     }
 }
 
 // One step is too short for the clock alone: a sample is the mean of many.
-#[divan::bench(sample_size = 200)]
-fn step(bencher: Bencher<'_, '_>) {
-    let mut running = Running::new();
+#[divan::bench(args = [0.0, 0.02], sample_size = 200)]
+fn step(bencher: Bencher<'_, '_>, amplitude: f64) {
+    let mut running = Running::new(amplitude);
     bencher.bench_local(|| running.step());
 }
 
