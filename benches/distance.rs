@@ -17,12 +17,15 @@ use truebead::width_control::response::{ResponseSettings, ResponseTest};
 const FRAME_S: f64 = 0.02;
 
 const OFFSET: Mm = Mm::constant(88.4);
-const OFFSET_SIGMA: Mm = Mm::constant(8.8);
 const GAUGE: Mm = Mm::constant(12.7);
 const START_SPEED: MmPerS = MmPerS::constant(112.5);
 const TARGET: Mm = Mm::constant(42.0);
 const ROUGHNESS: BeadRoughness = BeadRoughness { ratio: 0.0025, length_mm: 5.0 };
+/// Period of the flow's pulsation.
 const PERIOD_S: f64 = 3.0;
+/// The bead's exponent, and a speed near the one at which it is 42 mm wide: papers.md, "004".
+const EXPONENT: f64 = 0.221;
+const SPEED_MM_PER_S: f64 = 80.0;
 
 /// Control that is under way, of a robot that has its commanded speed at once.
 struct Running {
@@ -41,7 +44,7 @@ impl Running {
     fn new(amplitude: f64) -> Self {
         let controller = DistanceController::new(DistanceSettings {
             offset: OFFSET,
-            offset_sigma: OFFSET_SIGMA,
+            offset_sigma: Mm::constant(8.8),
             gauge: GAUGE,
             reference_speed: START_SPEED,
             exponent: 0.25,
@@ -52,7 +55,6 @@ impl Running {
         });
         let response = ResponseTest::new(ResponseSettings {
             offset: OFFSET,
-            offset_sigma: OFFSET_SIGMA,
             gauge: GAUGE,
             reference_speed: START_SPEED,
             roughness: ROUGHNESS,
@@ -71,7 +73,7 @@ impl Running {
         self.path_mm += self.speed * FRAME_S;
         let [rough, _] = hash::normal_pair(hash::mix(&[u64::from(self.count)]));
         let flow = self.amplitude * (TAU * at / PERIOD_S).sin() + ROUGHNESS.ratio * rough;
-        let ln_width = TARGET.get().ln() + flow - 0.221 * (self.speed / 80.0).ln();
+        let ln_width = TARGET.get().ln() + flow - EXPONENT * (self.speed / SPEED_MM_PER_S).ln();
         self.laid.push_back((self.path_mm, ln_width));
         let from = self.path_mm - OFFSET.get() - 0.5 * GAUGE.get();
         while self.laid.front().is_some_and(|(path, _)| *path < from) {

@@ -26,7 +26,6 @@ impl Setup {
         let cell = &self.cell;
         ResponseSettings {
             offset: cell.camera_offset,
-            offset_sigma: cell.camera_offset_sigma,
             gauge: cell.gauge_length,
             reference_speed: cell.start_speed,
             roughness: cell.bead_noise.roughness_at(self.control.target.nominal()),

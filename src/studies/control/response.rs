@@ -22,9 +22,6 @@ const LENGTH_MM: f64 = 3000.0;
 const COMMANDED: f64 = 0.10;
 /// Gauges beyond the offset within which that must be noticed.
 const MAX_GAUGES: f64 = 2.0;
-/// Standard deviation of an offset that was measured \[mm\]; a cell that states none has a tenth of
-/// the offset. Derived: four times the least that `tune` proposes.
-const OFFSET_SIGMA_MM: f64 = 2.0;
 /// Seconds in a thousand hours.
 const THOUSAND_HOURS_S: f64 = 3.6e6;
 
@@ -32,14 +29,7 @@ const THOUSAND_HOURS_S: f64 = 3.6e6;
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
     for (control, name) in [(Control::Distance, "by distance"), (Control::Pi, "by PI")] {
-        let case = format!("another bead in view, {name}");
-        rows.extend(fault_rows(cell, &case, seeds, |seed| with_other_bead(cell, control, seed))?);
-        let case = format!("another bead in view, offset ± {OFFSET_SIGMA_MM} mm, {name}");
-        rows.extend(fault_rows(cell, &case, seeds, |seed| {
-            let mut plan = with_other_bead(cell, control, seed)?;
-            plan.run.camera.offset_sigma = Mm::constant(OFFSET_SIGMA_MM);
-            Ok(plan)
-        })?);
+        rows.extend(fault_rows(cell, &format!("another bead in view, {name}"), seeds, control)?);
         let sound = observe(seeds, |seed| disturbed(cell, control, seed))?;
         let held = sound.iter().filter(|one| one.held_mm.is_some()).count();
         let lasted_s: f64 = sound.iter().map(|one| one.lasted_s).sum();
@@ -55,11 +45,10 @@ fn fault_rows(
     cell: LoopCell,
     case: &str,
     seeds: u64,
-    plan: impl Fn(u64) -> Result<Plan, ReproduceError> + Send + Sync,
+    control: Control,
 ) -> Result<[CaseRow; 2], ReproduceError> {
-    let most_mm =
-        Plan::new(cell, Control::Distance)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
-    let faulty = observe(seeds, plan)?;
+    let most_mm = Plan::new(cell, control)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
+    let faulty = observe(seeds, |seed| with_other_bead(cell, control, seed))?;
     // Where the speed hardly changes, there is nothing that the width could answer.
     let after: Vec<f64> = faulty.iter().filter_map(Noticed::after_mm).collect();
     let late = after.iter().filter(|after| **after > most_mm).count();
