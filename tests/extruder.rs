@@ -384,6 +384,20 @@ fn a_slip_that_grows_is_learnt() {
     assert!(off(&dull).abs() > 2.0 * off(&learnt).abs(), "{dull}");
 }
 
+/// The flow of this cell takes a second to rise, and two to be learnt: no wave begins there.
+#[test]
+fn a_flow_that_is_being_learnt_is_not_taken_for_a_pulsation() {
+    let cell = include_str!("../cells/extruder-adaptive.toml");
+    for seed in 1..=5 {
+        let with_seed = format!("[simulation]\nseed = {seed}");
+        let (status, said, summary) = simulated_cell(cell, &[("[simulation]", &with_seed)]);
+        assert_eq!(status, Some(0), "{said}");
+        let tolerance = &summary["tolerance"];
+        let out = number(tolerance, "out_of_tolerance_mm") / number(tolerance, "judged_mm");
+        assert!(out < 0.03, "seed {seed}: {tolerance}");
+    }
+}
+
 #[test]
 fn a_profile_tells_how_far_it_was_played() {
     let cell = include_str!("../cells/extruder-excite.toml");

@@ -14,9 +14,10 @@
 //! bead, from the width's own standard deviation, and from the drift of the flow that the cell
 //! states.
 
+mod exponent;
 mod flow_step;
-mod harmonic;
 mod outlier_run;
+mod pulsating_bead;
 mod pulsation;
 mod sample;
 mod width_model;
@@ -30,12 +31,13 @@ use super::bead_noise::{BeadRoughness, WidthNoise};
 use super::speed_history::SpeedHistory;
 use crate::core::{Mm, MmPerS, Span, Stamp};
 
+use exponent::Exponent;
 use flow_step::StepDetector;
 use outlier_run::OutlierRun;
 use pulsation::{FlowPulsation, PulsationSample};
 pub use sample::WidthReading;
 use sample::{GaugeInterval, MatchedWidth};
-use width_model::{WidthModel, WidthObservation};
+use width_model::{BETWEEN_BEADS_SIGMA, ExpectedBead, WidthModel, WidthObservation};
 
 /// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,15 +124,16 @@ impl DistanceController {
     /// A controller before the first width.
     pub fn new(settings: DistanceSettings) -> Self {
         let DistanceSettings { offset, gauge, .. } = settings;
+        let exponent = Exponent { prior: settings.exponent, learns: settings.learns_exponent };
         let history_mm = HISTORY_FACTOR * (offset + gauge).get() + MAX_UNMATCHED_MM;
         Self {
             settings,
             speed_history: SpeedHistory::new(settings.reference_speed.get(), history_mm),
-            model: WidthModel::new(settings.exponent, settings.learns_exponent),
+            model: WidthModel::new(exponent),
             noise: WidthNoise::new(settings.roughness, gauge.get()),
             steps: StepDetector::new(gauge.get()),
             outliers: OutlierRun::default(),
-            pulsation: FlowPulsation::new(),
+            pulsation: FlowPulsation::new(exponent),
             unmatched_since_mm: None,
             is_unmatched: false,
         }
@@ -142,6 +145,7 @@ impl DistanceController {
         self.steps.clear();
         self.outliers = OutlierRun::default();
         self.model.begin_bead();
+        self.pulsation.loosen(BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA);
         self.noise.begin_bead();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
@@ -178,9 +182,9 @@ impl DistanceController {
         if !self.is_ready() || width <= Mm::ZERO {
             return None;
         }
-        let pulsation = self.pulsation_between(from.secs(), (from + lasts).secs());
-        let ln_speed =
-            (self.model.ln_width() + pulsation - width.get().ln()) / self.model.exponent();
+        let ExpectedBead { ln_width, exponent, .. } =
+            self.bead_between(from.secs(), (from + lasts).secs());
+        let ln_speed = (ln_width - width.get().ln()) / exponent;
         let speed = self.settings.reference_speed.get()
             * ln_speed.clamp(-MAX_LN_SPEED_RATIO, MAX_LN_SPEED_RATIO).exp();
         MmPerS::new(speed).ok()
@@ -221,7 +225,14 @@ impl DistanceController {
         let drift = self.drift_per_mm() * spacing;
         let width_variance = sample.noise + self.noise.variance(spacing);
         self.model.advance_to(sample.position_mm, drift);
-        self.model.move_to(sample.ln_speed);
+        if let Some(wider) = self.model.move_to(sample.ln_speed) {
+            self.pulsation.widen_exponent(&wider);
+        }
+        self.pulsation.see(sample.laid_s);
+        if self.pulsates() {
+            let expected = self.bead_between(sample.laid_s, sample.laid_s);
+            self.model.take_exponent(&expected, sample.ln_speed);
+        }
         let half = 0.5 * sample.lasted_s;
         let pulsation = self.pulsation_between(sample.laid_s - half, sample.laid_s + half);
         let variance =
@@ -237,11 +248,18 @@ impl DistanceController {
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
         let taken = self.update(sample, &observation);
-        if taken != WidthUse::Change {
-            let value = sample.ln_width + self.model.exponent() * sample.ln_speed;
-            let MatchedWidth { laid_s, lasted_s, .. } = *sample;
+        let is_used = !matches!(taken, WidthUse::Change | WidthUse::Outlier);
+        if is_used && self.settings.cancels_pulsation {
+            let MatchedWidth { laid_s, lasted_s, ln_width, ln_speed, .. } = *sample;
             let variance = width_variance + sample.offset_variance;
-            self.pulsation.update(&PulsationSample { laid_s, lasted_s, value, variance, drift });
+            self.pulsation.update(&PulsationSample {
+                laid_s,
+                lasted_s,
+                ln_width,
+                ln_speed,
+                variance,
+                drift,
+            });
         }
         taken
     }
@@ -257,16 +275,14 @@ impl DistanceController {
         self.steps.push(front, *observation, self.model);
         let was_under_way = self.steps.is_under_way();
         if let Some(step) = self.steps.find(excess) {
-            if !self.steps.is_under_way() {
+            if !was_under_way {
                 self.pulsation.loosen(step.size * step.size);
             }
-            self.model = step.model;
-            self.model.advance_to(sample.position_mm, 0.0);
+            self.replace_model(step.model, sample.position_mm, observation);
             return WidthUse::Change;
         }
         if was_under_way && let Some(before) = self.steps.without_step() {
-            self.model = before;
-            self.model.advance_to(sample.position_mm, 0.0);
+            self.replace_model(before, sample.position_mm, observation);
             return WidthUse::Taken;
         }
         let observation =
@@ -280,8 +296,39 @@ impl DistanceController {
             return WidthUse::Taken;
         }
         self.outliers = OutlierRun::default();
-        self.model.update(&observation, self.model.informs_exponent(sample.ln_speed));
+        let informs = self.model.informs_exponent(sample.ln_speed) && !self.pulsates();
+        self.model.update(&observation, informs);
         WidthUse::Taken
+    }
+
+    /// Takes over a model with or without a step of the flow; the hypotheses of a pulsation follow.
+    fn replace_model(
+        &mut self,
+        mut model: WidthModel,
+        position_mm: f64,
+        observation: &WidthObservation,
+    ) {
+        model.advance_to(position_mm, 0.0);
+        let at_speed =
+            |model: &WidthModel| model.ln_width() - model.exponent() * observation.ln_speed;
+        let change = at_speed(&model) - at_speed(&self.model);
+        self.model = model;
+        self.pulsation.shift(change);
+    }
+
+    /// Whether a pulsation is found that may be cancelled. b is then estimated together with it.
+    fn pulsates(&self) -> bool {
+        self.settings.cancels_pulsation && self.pulsation.is_found()
+    }
+
+    /// The bead that is laid between two times \[s\].
+    fn bead_between(&self, from_s: f64, to_s: f64) -> ExpectedBead {
+        let steady = self.model.expected();
+        if self.settings.cancels_pulsation {
+            self.pulsation.bead(from_s, to_s, steady)
+        } else {
+            steady
+        }
     }
 
     /// Mean pulsation of ln w of bead laid between two times \[s\].

@@ -22,6 +22,9 @@ const KEPT_GAUGES: f64 = 2.0;
 const KEPT_MM: f64 = 30.0;
 /// Smallest number of widths that must have changed.
 const MIN_WIDTHS: usize = 3;
+/// Number of the newest widths among which they are looked for. Derived: beyond a step the gauge
+/// shows more and more of it, and every third width may be an outlier.
+const NEWEST_WIDTHS: usize = 5;
 /// Change of a width that counts, in standard deviations. Derived: once in 22 widths by chance,
 /// and three such widths in a row once in 10,000.
 const MIN_CHANGE_SIGMAS: f64 = 2.0;
@@ -188,6 +191,10 @@ impl StepDetector {
             return Vec::new();
         };
         let residuals = self.residuals(&base, scale, &base.estimate());
+        let newest = residuals.iter().rev().take(NEWEST_WIDTHS);
+        if !self.is_under_way && newest.filter(|one| one.is_changed()).count() < MIN_WIDTHS {
+            return Vec::new();
+        }
         let mut changed =
             (0..residuals.len()).rev().filter(|number| residuals[*number].is_changed());
         // After a later step too few widths would have changed.
@@ -443,11 +450,12 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
     use super::*;
+    use crate::width_control::distance::exponent::Exponent;
 
     const GAUGE: f64 = 63.0;
 
     fn known() -> WidthModel {
-        let mut model = WidthModel::new(0.25, true);
+        let mut model = WidthModel::new(Exponent { prior: 0.25, learns: true });
         for _ in 0..50 {
             model.update(&width(3.7), false);
         }

@@ -3,18 +3,14 @@
 
 use nalgebra::{Matrix2, Matrix4, Vector4};
 
-/// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
-/// 1, so a stated one may be far off.
-const EXPONENT_SIGMA: f64 = 0.4;
+use super::exponent::Exponent;
+
 /// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
 /// does not move ln A less, but b, which would take a wave for an effect of the speed.
 const OTHER_SIGMA: f64 = 0.007;
-/// Range of b, as factors on its initial value. Too small an exponent makes control too
-/// aggressive, so the lower end is nearer.
-const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
 /// Smallest difference of ln v to the best known speed at which a width updates b: noise of
 /// reported speeds below it would bias b towards 0 (errors in variables).
-const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
+pub const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
 /// Standard deviation of b after ln v has changed by 1, as a fraction of its initial value: a
 /// bead is a power of its speed only piece by piece. papers.md gives 0.221 and 0.267 on either
 /// side of 77 mm/s.
@@ -24,12 +20,10 @@ const EXPONENT_SIGMA_PER_ROOT: f64 = 0.15;
 pub const OFFSET_ERROR_VARIANCE: f64 = 0.25;
 /// Smallest variance that can be inverted.
 const MIN_VARIANCE: f64 = 1e-14;
-/// Largest standard deviation of b at an end of its range, as a fraction of its initial value.
-const SIGMA_AT_RANGE_END: f64 = 0.3;
 /// Standard deviation of ln A after the first width, which may be an outlier.
 const FIRST_SIGMA: f64 = 0.1;
 /// Standard deviation of the change of ln A from one bead to the next.
-const BETWEEN_BEADS_SIGMA: f64 = 0.02;
+pub const BETWEEN_BEADS_SIGMA: f64 = 0.02;
 /// Normalised innovation squared from which a width is an outlier: 3.5 standard deviations,
 /// once in 2150 widths by chance.
 const OUTLIER_SQUARED: f64 = 12.25;
@@ -45,8 +39,7 @@ pub const MAX_SQUARED_INNOVATION: f64 = 9.0;
 pub struct WidthModel {
     state: Vector4<f64>,
     covariance: Matrix4<f64>,
-    prior_exponent: f64,
-    learns_exponent: bool,
+    prior: Exponent,
     known: bool,
     position_mm: Option<f64>,
     /// Smallest and largest ln(v/v₀) of all widths.
@@ -64,6 +57,26 @@ pub struct WidthObservation {
     /// and further back.
     pub ln_speed_beside: [f64; 2],
     /// Variance of `ln_width`, without that of the offset.
+    pub variance: f64,
+}
+
+/// What ln w = ln A − b·ln(v/v₀) of a piece of bead is expected to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedBead {
+    /// ln A, with its pulsation.
+    pub ln_width: f64,
+    /// b.
+    pub exponent: f64,
+    /// Variance of b.
+    pub exponent_variance: f64,
+}
+
+/// An exponent that is less certain, about the width at a speed, which is as certain as it was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WiderExponent {
+    /// ln(v/v₀) of that speed.
+    pub ln_speed: f64,
+    /// By how much the variance of b grows.
     pub variance: f64,
 }
 
@@ -94,14 +107,13 @@ impl WidthInnovation {
 }
 
 impl WidthModel {
-    /// Before the first width. b is constant where `learns` is false.
-    pub fn new(exponent: f64, learns: bool) -> Self {
-        let sigma = if learns { EXPONENT_SIGMA * exponent } else { 0.0 };
+    /// Before the first width.
+    pub fn new(exponent: Exponent) -> Self {
+        let of_bead = Matrix2::new(1.0, 0.0, 0.0, exponent.prior_variance());
         Self {
-            state: Vector4::new(0.0, exponent, 0.0, 0.0),
-            covariance: with_offset_errors(Matrix2::new(1.0, 0.0, 0.0, sigma * sigma)),
-            prior_exponent: exponent,
-            learns_exponent: learns,
+            state: Vector4::new(0.0, exponent.prior, 0.0, 0.0),
+            covariance: with_offset_errors(of_bead),
+            prior: exponent,
             known: false,
             position_mm: None,
             ln_speeds: None,
@@ -178,14 +190,14 @@ impl WidthModel {
         let slopes = observation.slopes(&self.state);
         let informed = self.covariance * slopes;
         let mut gain = informed / (spread + noise);
-        gain.y = if learns && self.learns_exponent {
+        gain.y = if learns && self.prior.learns {
             informed.y / (spread + noise + OTHER_SIGMA * OTHER_SIGMA)
         } else {
             0.0
         };
         self.state += gain * innovation.by;
         self.covariance = updated_covariance(&self.covariance, &gain, &slopes, noise);
-        self.keep_exponent_in_range();
+        self.prior.keep_in_range(&mut self.state, &mut self.covariance);
     }
 
     fn begin(&mut self, observation: &WidthObservation) {
@@ -198,19 +210,10 @@ impl WidthModel {
         self.known = true;
     }
 
-    /// Clamps b to its range, and moves ln A along the correlation.
-    fn keep_exponent_in_range(&mut self) {
-        let (min, max) = EXPONENT_RANGE;
-        let within = self.exponent().clamp(min * self.prior_exponent, max * self.prior_exponent);
-        let exponent = self.covariance.m22;
-        if within == self.exponent() || exponent <= 0.0 {
-            return;
-        }
-        let slopes = self.covariance.column(1) / exponent;
-        self.state += slopes * (within - self.exponent());
-        self.state.y = within;
-        self.covariance -= slopes * slopes.transpose() * exponent;
-        self.covariance.m22 = exponent.min((SIGMA_AT_RANGE_END * self.prior_exponent).powi(2));
+    /// The bead that it expects.
+    pub fn expected(&self) -> ExpectedBead {
+        let (ln_width, exponent) = (self.ln_width(), self.exponent());
+        ExpectedBead { ln_width, exponent, exponent_variance: self.covariance.m22 }
     }
 
     /// ln A, b and the errors of the offset.
@@ -230,29 +233,45 @@ impl WidthModel {
     pub fn with_estimate(mut self, estimate: Vector4<f64>, covariance: Matrix4<f64>) -> Self {
         let exponent = self.exponent();
         (self.state, self.covariance) = (estimate, covariance);
-        if self.learns_exponent {
-            self.keep_exponent_in_range();
+        if self.prior.learns {
+            self.prior.keep_in_range(&mut self.state, &mut self.covariance);
         } else {
             self.state.y = exponent;
         }
         self
     }
 
-    /// A width is laid at ln(v/v₀). Beyond the speeds of all widths before, b is less certain;
-    /// the width at the nearest of these speeds is as certain as it was.
-    pub fn move_to(&mut self, ln_speed: f64) {
+    /// Takes over a b that was estimated elsewhere, with its variance. The width at ln(v/v₀) stays as
+    /// it is, and as certain.
+    pub fn take_exponent(&mut self, of: &ExpectedBead, ln_speed: f64) {
+        self.state.x += (of.exponent - self.state.y) * ln_speed;
+        self.state.y = of.exponent;
+        let mut to_width = Matrix4::identity();
+        to_width.m12 = -ln_speed;
+        let mut of_width = to_width * self.covariance * to_width.transpose();
+        of_width.row_mut(1).fill(0.0);
+        of_width.column_mut(1).fill(0.0);
+        of_width.m22 = of.exponent_variance;
+        to_width.m12 = ln_speed;
+        self.covariance = to_width * of_width * to_width.transpose();
+    }
+
+    /// A width is laid at ln(v/v₀). Beyond the speeds of all widths before, b is less certain.
+    pub fn move_to(&mut self, ln_speed: f64) -> Option<WiderExponent> {
         let Some((slowest, fastest)) = self.ln_speeds else {
             self.ln_speeds = Some((ln_speed, ln_speed));
-            return;
+            return None;
         };
         let nearest = ln_speed.clamp(slowest, fastest);
         self.ln_speeds = Some((slowest.min(ln_speed), fastest.max(ln_speed)));
-        if self.learns_exponent && self.known {
-            let beyond = (ln_speed - nearest).abs();
-            let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior_exponent).powi(2);
-            let slopes = Vector4::new(nearest, 1.0, 0.0, 0.0);
-            self.covariance += slopes * slopes.transpose() * variance;
+        let beyond = (ln_speed - nearest).abs();
+        if !self.prior.learns || !self.known || beyond == 0.0 {
+            return None;
         }
+        let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior.prior).powi(2);
+        let slopes = Vector4::new(nearest, 1.0, 0.0, 0.0);
+        self.covariance += slopes * slopes.transpose() * variance;
+        Some(WiderExponent { ln_speed: nearest, variance })
     }
 }
 
@@ -304,6 +323,8 @@ fn updated_covariance(
 mod tests {
     use super::*;
 
+    const LEARNT: Exponent = Exponent { prior: 0.25, learns: true };
+
     fn observed(ln_width: f64, ln_speed: f64) -> WidthObservation {
         WidthObservation { ln_width, ln_speed, ln_speed_beside: [0.0; 2], variance: 1e-6 }
     }
@@ -314,7 +335,7 @@ mod tests {
 
     #[test]
     fn two_speeds_identify_level_and_exponent() {
-        let mut model = WidthModel::new(0.25, true);
+        let mut model = WidthModel::new(LEARNT);
         for k in 0..40 {
             model.advance_to(f64::from(k), 1e-12);
             let u = if k < 20 { 0.0 } else { -0.4 };
@@ -327,7 +348,7 @@ mod tests {
 
     #[test]
     fn a_constant_exponent_stays_and_the_level_follows() {
-        let mut model = WidthModel::new(0.25, false);
+        let mut model = WidthModel::new(Exponent { learns: false, ..LEARNT });
         for k in 0..60 {
             let u = if k < 20 { 0.0 } else { -0.4 };
             model.advance_to(f64::from(k), 1e-6);
@@ -339,7 +360,7 @@ mod tests {
 
     #[test]
     fn at_the_end_of_its_range_the_exponent_stays_and_the_width_is_still_predicted() {
-        let mut model = WidthModel::new(0.25, true);
+        let mut model = WidthModel::new(LEARNT);
         for k in 0..60 {
             let u = if k < 20 { 0.0 } else { -0.4 };
             model.advance_to(f64::from(k), 1e-7);
@@ -350,8 +371,25 @@ mod tests {
     }
 
     #[test]
+    fn an_exponent_that_is_taken_over_leaves_the_width_at_its_speed_as_it_is() {
+        let mut model = WidthModel::new(LEARNT);
+        for k in 0..40 {
+            model.update(&observed(3.7, if k < 20 { 0.0 } else { -0.4 }), false);
+        }
+        let (there, elsewhere) = (observed(3.7, -0.4), observed(3.7, 0.1));
+        let before = model.innovation(&there);
+        let other = ExpectedBead { ln_width: 3.7, exponent: 0.3, exponent_variance: 1e-6 };
+        model.take_exponent(&other, -0.4);
+        let after = model.innovation(&there);
+        assert!((after.by - before.by).abs() < 1e-12);
+        assert!((after.variance - before.variance).abs() < 1e-15);
+        assert!(model.innovation(&elsewhere).variance < 2.0 * before.variance);
+        assert!(model.covariance().cholesky().is_some());
+    }
+
+    #[test]
     fn an_outlier_as_first_width_is_corrected() {
-        let mut model = WidthModel::new(0.25, true);
+        let mut model = WidthModel::new(LEARNT);
         model.update(&observed(3.9, 0.0), true);
         for k in 1..12 {
             model.advance_to(f64::from(k), 1e-9);
@@ -368,7 +406,7 @@ mod tests {
 
     #[test]
     fn the_covariance_stays_positive_definite() {
-        let mut model = WidthModel::new(0.25, true);
+        let mut model = WidthModel::new(LEARNT);
         for k in 0..500 {
             let u = 0.3 * f64::from(k).sin();
             model.advance_to(f64::from(k), 1e-8);

@@ -1,0 +1,269 @@
+//! A bead whose flow pulsates with a known period: a Kalman filter on ln A, on b and on the two
+//! components of the harmonic, which rotate with time. They are estimated together: a wrong b
+//! is an error of the level where the speed changes, and would be taken for a pulsation.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::exponent::Exponent;
+use super::pulsation::PulsationSample;
+use super::width_model::{MAX_SQUARED_INNOVATION, MIN_LN_SPEED_DIFFERENCE, WiderExponent};
+
+/// Initial standard deviation of either component, as a fraction of the width: pulsations of
+/// a pump or a screw are a few percent.
+const AMPLITUDE_SIGMA: f64 = 0.03;
+/// Random walk of either component: standard deviation over a radian. A larger value follows
+/// a pulsation that changes and takes more noise for one.
+const DRIFT_PER_ROOT_RAD: f64 = 2e-4;
+/// Initial standard deviation of the level.
+const LEVEL_SIGMA: f64 = 0.1;
+
+/// State: ln A, b, the in-phase component and the component a quarter of a period ahead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PulsatingBead {
+    rad_per_s: f64,
+    exponent: Exponent,
+    state: Vector4<f64>,
+    covariance: Matrix4<f64>,
+    known: bool,
+}
+
+impl PulsatingBead {
+    /// For a period \[s\]; infinite for a bead without pulsation.
+    pub fn new(period_s: f64, exponent: Exponent) -> Self {
+        let bead = Self {
+            rad_per_s: TAU / period_s,
+            exponent,
+            state: Vector4::new(0.0, exponent.prior, 0.0, 0.0),
+            covariance: Matrix4::zeros(),
+            known: false,
+        };
+        bead.begin(exponent.prior_variance())
+    }
+
+    /// Before the first width of a bead: of all that was known, b remains.
+    pub fn begin_again(self) -> Self {
+        self.begin(self.covariance.m22)
+    }
+
+    fn begin(mut self, exponent_variance: f64) -> Self {
+        let part = if self.pulsates() { AMPLITUDE_SIGMA * AMPLITUDE_SIGMA } else { 0.0 };
+        let spread = Vector4::new(LEVEL_SIGMA * LEVEL_SIGMA, exponent_variance, part, part);
+        self.state = Vector4::new(0.0, self.state.y, 0.0, 0.0);
+        self.covariance = Matrix4::from_diagonal(&spread);
+        self.known = false;
+        self
+    }
+
+    /// Whether it has a pulsation.
+    pub fn pulsates(&self) -> bool {
+        self.rad_per_s > 0.0
+    }
+
+    /// Period \[s\].
+    pub fn period_s(&self) -> f64 {
+        TAU / self.rad_per_s
+    }
+
+    /// Adds a width of bead laid `dt_s` after the last one. Returns its log likelihood, without the
+    /// constant.
+    pub fn update(&mut self, dt_s: f64, one: &PulsationSample) -> f64 {
+        let PulsationSample { ln_width, ln_speed, variance, drift, lasted_s, .. } = *one;
+        if !self.known {
+            self.known = true;
+            self.state.x = ln_width + self.state.y * ln_speed;
+            let both = ln_speed * self.covariance.m22;
+            (self.covariance.m12, self.covariance.m21) = (both, both);
+            self.covariance.m11 += ln_speed * both;
+            return 0.0;
+        }
+        self.advance(dt_s, drift);
+        let kept = self.kept_over(lasted_s);
+        let slopes = Vector4::new(1.0, -self.informing_speed(ln_speed), kept, 0.0);
+        let informed = self.covariance * slopes;
+        let total = slopes.dot(&informed).max(0.0) + variance;
+        let by = ln_width - Vector4::new(1.0, -ln_speed, kept, 0.0).dot(&self.state);
+        let squared = (by * by / total).min(MAX_SQUARED_INNOVATION);
+        let limit = (MAX_SQUARED_INNOVATION * total).sqrt();
+        let gain = informed / total;
+        self.state += gain * by.clamp(-limit, limit);
+        self.covariance -= gain * informed.transpose();
+        self.exponent.keep_in_range(&mut self.state, &mut self.covariance);
+        -0.5 * (squared + libm::log(total))
+    }
+
+    /// ln(v/v₀) by which a width informs b: near the speed at which the width is known best, that
+    /// speed, which says nothing of b.
+    fn informing_speed(&self, ln_speed: f64) -> f64 {
+        let (both, exponent) = (self.covariance.m12, self.covariance.m22);
+        if exponent <= 0.0 {
+            return ln_speed;
+        }
+        let known_best = both / exponent;
+        if (ln_speed - known_best).abs() > MIN_LN_SPEED_DIFFERENCE { ln_speed } else { known_best }
+    }
+
+    /// Rotates the components; ln A has drifted by a variance.
+    fn advance(&mut self, dt_s: f64, drift: f64) {
+        let angle = self.rad_per_s * dt_s;
+        self.covariance.m11 += drift;
+        if angle == 0.0 {
+            return;
+        }
+        let (sin, cos) = libm::sincos(angle);
+        let turned = |all: &Matrix4<f64>| {
+            let (ahead, beside) = (all.row(2), all.row(3));
+            let mut turned = *all;
+            turned.set_row(2, &(ahead * cos + beside * sin));
+            turned.set_row(3, &(beside * cos - ahead * sin));
+            turned
+        };
+        let (ahead, beside) = (self.state.z, self.state.w);
+        (self.state.z, self.state.w) = (ahead * cos + beside * sin, beside * cos - ahead * sin);
+        self.covariance = turned(&turned(&self.covariance).transpose());
+        let part_drift = 2.0 * DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * angle;
+        self.covariance.m33 += part_drift;
+        self.covariance.m44 += part_drift;
+    }
+
+    /// ln A without the pulsation.
+    pub fn level(&self) -> f64 {
+        self.state.x
+    }
+
+    /// b.
+    pub fn exponent(&self) -> f64 {
+        self.state.y
+    }
+
+    /// Variance of b.
+    pub fn exponent_variance(&self) -> f64 {
+        self.covariance.m22
+    }
+
+    /// The flow has stepped: ln A has changed.
+    pub fn shift(&mut self, by: f64) {
+        self.state.x += by;
+    }
+
+    /// ln A may have changed by a variance.
+    pub fn loosen(&mut self, variance: f64) {
+        self.covariance.m11 += variance;
+    }
+
+    /// b is less certain.
+    pub fn widen_exponent(&mut self, by: &WiderExponent) {
+        let slopes = Vector4::new(by.ln_speed, 1.0, 0.0, 0.0);
+        self.covariance += slopes * slopes.transpose() * by.variance;
+    }
+
+    /// What a mean over a time \[s\] keeps of the amplitude; negative where it inverts it.
+    pub fn kept_over(&self, lasted_s: f64) -> f64 {
+        let half = 0.5 * self.rad_per_s * lasted_s;
+        if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half }
+    }
+
+    /// The pulsation of ln w, in the mean between two times after the last width \[s\].
+    pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
+        let (sin, cos) = libm::sincos(self.rad_per_s * 0.5 * (from_s + to_s));
+        (cos * self.state.z + sin * self.state.w) * self.kept_over(to_s - from_s)
+    }
+
+    /// Expected square of that mean.
+    pub fn mean_square(&self, from_s: f64, to_s: f64) -> f64 {
+        let (sin, cos) = libm::sincos(self.rad_per_s * 0.5 * (from_s + to_s));
+        let toward = Vector4::new(0.0, 0.0, cos, sin);
+        let variance = toward.dot(&(self.covariance * toward));
+        self.mean(from_s, to_s).powi(2) + self.kept_over(to_s - from_s).powi(2) * variance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::hash;
+
+    const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
+
+    fn sample(ln_width: f64, ln_speed: f64, lasted_s: f64) -> PulsationSample {
+        PulsationSample { laid_s: 0.0, lasted_s, ln_width, ln_speed, variance: 1e-6, drift: 1e-9 }
+    }
+
+    #[test]
+    fn a_pulsation_of_its_period_is_predicted() {
+        let period = 2.3;
+        let truth = |at: f64| 3.7 + 0.02 * (TAU * at / period + 0.4).sin();
+        let mut bead = PulsatingBead::new(period, EXPONENT);
+        for k in 0..600 {
+            let _ = bead.update(0.02, &sample(truth(0.02 * f64::from(k)), 0.0, 0.0));
+        }
+        let last = 0.02 * 599.0;
+        for ahead in [0.0, 0.5, 1.3] {
+            let found = bead.mean(ahead, ahead) - (truth(last + ahead) - 3.7);
+            assert!(found.abs() < 1e-4, "{ahead}: {found}");
+        }
+        let mean = bead.mean(0.2, 0.2 + period);
+        assert!(mean.abs() < 1e-9, "a whole period has no mean: {mean}");
+    }
+
+    #[test]
+    fn a_change_of_the_speed_in_a_pulsation_shows_the_exponent() {
+        let (period, exponent) = (2.3, 0.32);
+        let mut bead = PulsatingBead::new(period, EXPONENT);
+        for k in 0..600 {
+            let at = 0.02 * f64::from(k);
+            let ln_speed = if at < 1.5 { 0.0 } else { -0.4 };
+            let ln_width = 3.7 - exponent * ln_speed + 0.02 * (TAU * at / period).sin();
+            let _ = bead.update(0.02, &sample(ln_width, ln_speed, 0.0));
+        }
+        assert!((bead.exponent() - exponent).abs() < 2e-3, "{bead:?}");
+        assert!((bead.level() - 3.7).abs() < 1e-3);
+    }
+
+    #[test]
+    fn noise_of_a_constant_speed_says_nothing_of_the_exponent() {
+        let mut bead = PulsatingBead::new(2.3, EXPONENT);
+        for k in 0..2000 {
+            let [speed_noise, width_noise] = hash::normal_pair(hash::mix(&[5, k]));
+            let _ = bead.update(0.1, &sample(3.7 + 0.001 * width_noise, 0.004 * speed_noise, 0.0));
+        }
+        assert!((bead.exponent() - EXPONENT.prior).abs() < 0.01, "{}", bead.exponent());
+        assert!(bead.exponent_variance() > 0.8 * EXPONENT.prior_variance());
+    }
+
+    #[test]
+    fn a_steady_bead_has_no_pulsation() {
+        let mut bead = PulsatingBead::new(f64::INFINITY, EXPONENT);
+        for k in 0..100 {
+            let _ = bead.update(0.1, &sample(3.7 + 0.01 * f64::from(k % 2), 0.0, 0.0));
+        }
+        assert_eq!(bead.mean(0.3, 0.3), 0.0);
+    }
+
+    #[test]
+    fn a_mean_over_a_gauge_is_less_than_the_pulsation_at_the_nozzle() {
+        let (period, lasted) = (2.0, 0.8);
+        let half = 0.5 * TAU * lasted / period;
+        let truth = |at: f64| 0.02 * (TAU * at / period).sin();
+        let mut bead = PulsatingBead::new(period, EXPONENT);
+        for k in 0..600 {
+            let seen = 3.7 + truth(0.02 * f64::from(k)) * half.sin() / half;
+            let _ = bead.update(0.02, &sample(seen, 0.0, lasted));
+        }
+        let off = bead.mean(0.5, 0.5) - truth(0.02 * 599.0 + 0.5);
+        assert!(off.abs() < 1e-4, "{off}");
+    }
+
+    #[test]
+    fn of_the_bead_before_only_the_exponent_remains() {
+        let mut bead = PulsatingBead::new(2.0, EXPONENT);
+        for k in 0..100 {
+            let ln_speed = if k < 50 { 0.0 } else { -0.4 };
+            let _ = bead.update(0.1, &sample(3.7 - 0.3 * ln_speed, ln_speed, 0.0));
+        }
+        let again = bead.begin_again();
+        assert_eq!(again.exponent(), bead.exponent());
+        assert_eq!(again.mean(0.0, 0.0), 0.0);
+    }
+}
