@@ -226,7 +226,7 @@ mod tests {
         let mut bead = PulsatingBead::new(2.3, EXPONENT);
         for k in 0..2000 {
             let [speed_noise, width_noise] = hash::normal_pair(hash::mix(&[5, k]));
-            let _ = bead.update(0.1, &sample(3.7 + 0.001 * width_noise, 0.004 * speed_noise, 0.0));
+            let _ = bead.update(0.1, &sample(3.7 + 0.001 * width_noise, 0.002 * speed_noise, 0.0));
         }
         assert!((bead.exponent() - EXPONENT.prior).abs() < 0.01, "{}", bead.exponent());
         assert!(bead.exponent_variance() > 0.8 * EXPONENT.prior_variance());

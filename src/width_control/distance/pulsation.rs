@@ -287,12 +287,12 @@ mod tests {
         let mut found = 0;
         for seed in 0..20 {
             let mut pulsation = FlowPulsation::new(Exponent { prior: 0.25, learns: true });
-            let (mut ln_width, variance, drift) = (3.7, 1e-6, 1e-7);
-            for k in 0..400 {
-                let [walk, noise] = hash::normal_pair(hash::mix(&[seed, k]));
+            let (mut ln_width, variance, drift) = (3.7, 1e-6_f64, 1e-7_f64);
+            for k in 0..400_u32 {
+                let [walk, noise] = hash::normal_pair(hash::mix(&[seed, u64::from(k)]));
                 ln_width += 7.0 * drift.sqrt() * walk;
                 pulsation.update(&PulsationSample {
-                    laid_s: 0.1 * k as f64,
+                    laid_s: 0.1 * f64::from(k),
                     lasted_s: 0.0,
                     ln_width: ln_width + variance.sqrt() * noise,
                     ln_speed: 0.0,
