@@ -229,14 +229,14 @@ impl DistanceController {
             self.pulsation.widen_exponent(&wider);
         }
         self.pulsation.see(sample.laid_s);
-        if self.pulsates() {
+        if self.pulsation.is_found() {
             let expected = self.bead_between(sample.laid_s, sample.laid_s);
             self.model.take_exponent(&expected, sample.ln_speed);
         }
         let half = 0.5 * sample.lasted_s;
-        let pulsation = self.pulsation_between(sample.laid_s - half, sample.laid_s + half);
-        let variance =
-            width_variance + self.pulsation_variance(sample.laid_s - half, sample.laid_s + half);
+        let (from_s, to_s) = (sample.laid_s - half, sample.laid_s + half);
+        let pulsation = self.pulsation.mean(from_s, to_s);
+        let variance = width_variance + self.pulsation.variance(from_s, to_s);
         let observation = WidthObservation {
             ln_width: sample.ln_width - pulsation,
             ln_speed: sample.ln_speed,
@@ -248,6 +248,7 @@ impl DistanceController {
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
         let taken = self.update(sample, &observation);
+        // Without a width no pulsation is ever found.
         let is_used = !matches!(taken, WidthUse::Change | WidthUse::Outlier);
         if is_used && self.settings.cancels_pulsation {
             let MatchedWidth { laid_s, lasted_s, ln_width, ln_speed, .. } = *sample;
@@ -296,7 +297,7 @@ impl DistanceController {
             return WidthUse::Taken;
         }
         self.outliers = OutlierRun::default();
-        let informs = self.model.informs_exponent(sample.ln_speed) && !self.pulsates();
+        let informs = self.model.informs_exponent(sample.ln_speed) && !self.pulsation.is_found();
         self.model.update(&observation, informs);
         WidthUse::Taken
     }
@@ -316,28 +317,9 @@ impl DistanceController {
         self.pulsation.shift(change);
     }
 
-    /// Whether a pulsation is found that may be cancelled. b is then estimated together with it.
-    fn pulsates(&self) -> bool {
-        self.settings.cancels_pulsation && self.pulsation.is_found()
-    }
-
     /// The bead that is laid between two times \[s\].
     fn bead_between(&self, from_s: f64, to_s: f64) -> ExpectedBead {
-        let steady = self.model.expected();
-        if self.settings.cancels_pulsation {
-            self.pulsation.bead(from_s, to_s, steady)
-        } else {
-            steady
-        }
-    }
-
-    /// Mean pulsation of ln w of bead laid between two times \[s\].
-    fn pulsation_between(&self, from_s: f64, to_s: f64) -> f64 {
-        if self.settings.cancels_pulsation { self.pulsation.mean(from_s, to_s) } else { 0.0 }
-    }
-
-    fn pulsation_variance(&self, from_s: f64, to_s: f64) -> f64 {
-        if self.settings.cancels_pulsation { self.pulsation.variance(from_s, to_s) } else { 0.0 }
+        self.pulsation.bead(from_s, to_s, self.model.expected())
     }
 
     fn drift_per_mm(&self) -> f64 {

@@ -154,8 +154,7 @@ impl PulsatingBead {
 
     /// b is less certain.
     pub fn widen_exponent(&mut self, by: &WiderExponent) {
-        let slopes = Vector4::new(by.ln_speed, 1.0, 0.0, 0.0);
-        self.covariance += slopes * slopes.transpose() * by.variance;
+        by.widen(&mut self.covariance);
     }
 
     /// What a mean over a time \[s\] keeps of the amplitude; negative where it inverts it.

@@ -53,6 +53,8 @@ pub struct PulsationSample {
 pub struct FlowPulsation {
     hypotheses: Vec<Hypothesis>,
     last_s: Option<f64>,
+    /// How long the nozzle took for the gauge of the last width \[s\].
+    lasted_s: f64,
     /// When the newest width was laid, whether it was used or not \[s\].
     seen_s: Option<f64>,
     /// Time over which widths have come \[s\].
@@ -67,8 +69,6 @@ struct Hypothesis {
     /// Logarithm of its likelihood over that of the likeliest.
     log_ratio: f64,
     weight: f64,
-    /// Whether the gauge keeps enough of it to cancel it.
-    can_be_cancelled: bool,
 }
 
 impl FlowPulsation {
@@ -84,6 +84,7 @@ impl FlowPulsation {
         Self {
             hypotheses: steady.chain(pulsating).collect(),
             last_s: None,
+            lasted_s: 0.0,
             seen_s: None,
             observed_s: 0.0,
         }
@@ -111,7 +112,7 @@ impl FlowPulsation {
         if passed < 0.0 {
             return;
         }
-        self.last_s = Some(one.laid_s);
+        (self.last_s, self.lasted_s) = (Some(one.laid_s), one.lasted_s);
         self.observed_s += passed;
         for hypothesis in &mut self.hypotheses {
             hypothesis.update(passed, one);
@@ -166,9 +167,9 @@ impl FlowPulsation {
         let mut expected = steady;
         let square_of_steady = steady.exponent_variance + steady.exponent.powi(2);
         let mut square = square_of_steady;
-        for Hypothesis { bead, weight, can_be_cancelled, .. } in self.pulsating() {
-            let pulsation =
-                if *can_be_cancelled { bead.mean(from_s - last, to_s - last) } else { 0.0 };
+        for Hypothesis { bead, weight, .. } in self.pulsating() {
+            let is_seen = bead.kept_over(self.lasted_s).abs() > MIN_KEPT;
+            let pulsation = if is_seen { bead.mean(from_s - last, to_s - last) } else { 0.0 };
             expected.ln_width += weight * (bead.level() + pulsation - steady.ln_width);
             expected.exponent += weight * (bead.exponent() - steady.exponent);
             square +=
@@ -209,22 +210,21 @@ impl FlowPulsation {
 
     /// The hypotheses of a pulsation that count. A bead without one has no period that has passed.
     fn pulsating(&self) -> impl Iterator<Item = &Hypothesis> {
-        let is_seen = |one: &Hypothesis| self.observed_s > MIN_PERIODS * one.bead.period_s();
-        self.hypotheses.iter().filter(move |one| one.weight > MIN_WEIGHT && is_seen(one))
+        let has_passed = |one: &Hypothesis| self.observed_s > MIN_PERIODS * one.bead.period_s();
+        self.hypotheses.iter().filter(move |one| one.weight > MIN_WEIGHT && has_passed(one))
     }
 }
 
 impl Hypothesis {
     fn new(period_s: f64, drift_ratio: f64, exponent: Exponent) -> Self {
         let bead = PulsatingBead::new(period_s, exponent);
-        Self { bead, drift_ratio, log_ratio: 0.0, weight: 0.0, can_be_cancelled: false }
+        Self { bead, drift_ratio, log_ratio: 0.0, weight: 0.0 }
     }
 
     fn update(&mut self, passed_s: f64, one: &PulsationSample) {
         let sample = PulsationSample { drift: one.drift * self.drift_ratio, ..*one };
         let kept = 1.0 - (passed_s / MEMORY_S).min(1.0);
         self.log_ratio = self.log_ratio * kept + self.bead.update(passed_s, &sample);
-        self.can_be_cancelled = self.bead.kept_over(one.lasted_s).abs() > MIN_KEPT;
     }
 
     fn log_prior(&self) -> f64 {

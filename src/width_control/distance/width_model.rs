@@ -80,6 +80,14 @@ pub struct WiderExponent {
     pub variance: f64,
 }
 
+impl WiderExponent {
+    /// Adds it to the covariance of a state that begins with ln A and b.
+    pub fn widen(&self, covariance: &mut Matrix4<f64>) {
+        let slopes = Vector4::new(self.ln_speed, 1.0, 0.0, 0.0);
+        *covariance += slopes * slopes.transpose() * self.variance;
+    }
+}
+
 /// Innovation: measured less predicted ln w.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthInnovation {
@@ -269,9 +277,9 @@ impl WidthModel {
             return None;
         }
         let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior.prior).powi(2);
-        let slopes = Vector4::new(nearest, 1.0, 0.0, 0.0);
-        self.covariance += slopes * slopes.transpose() * variance;
-        Some(WiderExponent { ln_speed: nearest, variance })
+        let wider = WiderExponent { ln_speed: nearest, variance };
+        wider.widen(&mut self.covariance);
+        Some(wider)
     }
 }
 
