@@ -1,5 +1,5 @@
-//! How long one step of control by distance takes: a report, a width and a setpoint, and the test
-//! whether the width answers. A setpoint every 50 ms leaves a thousand times as long.
+//! How long one step of control by distance takes: a report, a width and a setpoint, and the watch
+//! over the bead's model. A setpoint every 50 ms leaves a thousand times as long.
 
 #![expect(clippy::expect_used, reason = "a benchmark of sound input")]
 
@@ -12,7 +12,7 @@ use truebead::sim::hash;
 use truebead::width_control::bead_noise::BeadRoughness;
 use truebead::width_control::controller::BeadReport;
 use truebead::width_control::distance::{DistanceController, DistanceSettings, WidthReading};
-use truebead::width_control::response::{ResponseSettings, ResponseTest};
+use truebead::width_control::watch::{BeadWatch, WatchSettings};
 
 const FRAME_S: f64 = 0.02;
 
@@ -30,7 +30,7 @@ const SPEED_MM_PER_S: f64 = 80.0;
 /// Control that is under way, of a robot that has its commanded speed at once.
 struct Running {
     controller: DistanceController,
-    response: ResponseTest,
+    watch: BeadWatch,
     /// Amplitude of the flow's pulsation.
     amplitude: f64,
     count: u32,
@@ -53,15 +53,16 @@ impl Running {
             roughness: ROUGHNESS,
             cancels_pulsation: true,
         });
-        let response = ResponseTest::new(ResponseSettings {
+        let watch = BeadWatch::new(WatchSettings {
             offset: OFFSET,
             gauge: GAUGE,
             reference_speed: START_SPEED,
+            exponent: Some(0.25),
             roughness: ROUGHNESS,
         });
         let (speed, laid) = (START_SPEED.get(), VecDeque::new());
         let mut running =
-            Self { controller, response, amplitude, count: 0, path_mm: 0.0, speed, laid };
+            Self { controller, watch, amplitude, count: 0, path_mm: 0.0, speed, laid };
         for _ in 0..1500 {
             running.step();
         }
@@ -94,10 +95,10 @@ impl Running {
         let (path, speed) = (Mm::new(self.path_mm), MmPerS::new(self.speed));
         let (path, speed) = (path.expect("finite"), speed.expect("finite"));
         self.controller.reported(now, path, speed, 1.0);
-        self.response.reported(&BeadReport { at: now, path, speed, flow_ratio: 1.0 });
+        self.watch.reported(&BeadReport { at: now, path, speed, flow_ratio: 1.0 });
         if let Some(reading) = reading {
             let _ = self.controller.measured(path, reading);
-            let _ = self.response.measured(path, reading, TARGET);
+            let _ = self.watch.measured(path, reading, TARGET);
         }
         let commanded = self.controller.speed(TARGET, now, Span::from_millis(50));
         if let Some(commanded) = commanded {

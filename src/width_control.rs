@@ -8,11 +8,11 @@ pub mod limiter;
 pub mod odometer;
 pub mod path_history;
 pub mod pi;
-pub mod response;
 mod speed_history;
 pub mod steps;
 pub mod strategy;
 pub mod target;
+pub mod watch;
 
 pub use distance::{DistanceTrace, FallbackReason};
 pub use limiter::SpeedLimit;

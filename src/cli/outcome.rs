@@ -76,6 +76,9 @@ pub fn print_figures(summary: &Summary) {
             control.robot_reports_ignored
         );
     }
+    if let Some(wrong) = control.wrong_offset {
+        say!("offset     {}", names::wrong_offset_in_words(wrong));
+    }
     say!("faults     {}", control.faults);
     for (reason, count) in &control.fault_reasons {
         say!("           {count} {}", names::in_words(reason));

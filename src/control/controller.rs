@@ -13,7 +13,7 @@ use crate::width_control::distance::WidthReading;
 use crate::width_control::limiter::SpeedLimit;
 use crate::width_control::odometer::Odometer;
 use crate::width_control::path_history::PathHistory;
-use crate::width_control::response::ResponseTest;
+use crate::width_control::watch::BeadWatch;
 
 /// The controller of a cell. It controls the width by the robot's speed and, where the
 /// cell has an extruder that is commanded, the flow by the extruder's command.
@@ -29,8 +29,8 @@ pub struct Controller {
     pub(super) camera_lost: bool,
     /// The first of the latest equal frames.
     pub(super) first_equal: Option<FirstEqual>,
-    /// Whether the width answers the speed; none where the speed does not control the width.
-    pub(super) response: Option<ResponseTest>,
+    /// Whether the width is what the speed says; none where the speed does not control the width.
+    pub(super) watch: Option<BeadWatch>,
 }
 
 /// The first of several equal frames.
@@ -67,7 +67,7 @@ impl Controller {
         let width = setup.control.strategy.controller(&setup.cell, &setup.control);
         let (bead, robot) = (BeadOnPath::default(), RobotMonitor::default());
         let is_controlled = setup.control.strategy.controls_width();
-        let response = is_controlled.then(|| ResponseTest::new(setup.response_settings()));
+        let watch = is_controlled.then(|| BeadWatch::new(setup.watch_settings()));
         Self {
             setup,
             width,
@@ -77,7 +77,7 @@ impl Controller {
             robot,
             camera_lost: false,
             first_equal: None,
-            response,
+            watch,
         }
     }
 

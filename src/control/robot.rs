@@ -86,8 +86,8 @@ impl Controller {
     pub(super) fn begin_again(&mut self, from: Mm) {
         self.bead.known_from = from;
         self.width.bead_interrupted();
-        if let Some(response) = &mut self.response {
-            response.begin_bead();
+        if let Some(watch) = &mut self.watch {
+            watch.begin_bead();
         }
     }
 
@@ -108,8 +108,8 @@ impl Controller {
             self.width.path_is_estimated();
         }
         self.width.robot_reported(&report);
-        if let Some(response) = &mut self.response {
-            response.reported(&report);
+        if let Some(watch) = &mut self.watch {
+            watch.reported(&report);
         }
         let Some(bead) = self.phase.bead_mut() else { return };
         let requested = bead.setpoint.map_or(self.setup.cell.start_speed, |last| last.speed);
@@ -140,8 +140,8 @@ impl Controller {
         self.phase = Phase::Bead(Bead::new());
         self.next_bead();
         self.width.begin_bead();
-        if let Some(response) = &mut self.response {
-            response.begin_bead();
+        if let Some(watch) = &mut self.watch {
+            watch.begin_bead();
         }
     }
 

@@ -2,8 +2,8 @@
 
 use crate::core::{Mm, Span};
 use crate::width_control::limiter::SpeedLimits;
-use crate::width_control::response::ResponseSettings;
 use crate::width_control::strategy::{CellParameters, WidthControlSettings};
+use crate::width_control::watch::WatchSettings;
 
 /// Everything that a controller has to know of its cell.
 #[derive(Debug, Clone)]
@@ -21,13 +21,14 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// What the test is made for whether the width answers the speed.
-    pub(super) fn response_settings(&self) -> ResponseSettings {
+    /// What the watch over the bead's model is made for.
+    pub(super) fn watch_settings(&self) -> WatchSettings {
         let cell = &self.cell;
-        ResponseSettings {
+        WatchSettings {
             offset: cell.camera_offset,
             gauge: cell.gauge_length,
             reference_speed: cell.start_speed,
+            exponent: self.control.strategy.exponent(),
             roughness: cell.bead_noise.roughness_at(self.control.target.nominal()),
         }
     }

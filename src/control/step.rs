@@ -7,8 +7,8 @@ use crate::core::{Mm, MmPerS, Span, Stamp};
 use crate::extruder::{ExtruderCommand, ExtruderFault, ExtruderState, ExtruderTrace};
 use crate::width_control::SpeedLimit;
 use crate::width_control::distance::{DistanceTrace, FallbackReason};
-use crate::width_control::response::NoResponse;
 use crate::width_control::steps::StepsTrace;
+use crate::width_control::watch::{NoResponse, WrongOffset};
 
 /// What is to be sent to the robot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -164,6 +164,9 @@ pub struct Trace {
     /// Why PI control has taken over from control by distance, if it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallback: Option<FallbackReason>,
+    /// The offset that fits the widths better than the stated one, from the width on that shows it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wrong_offset: Option<WrongOffset>,
     /// Progress of a step experiment, where the cell has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<StepsTrace>,

@@ -95,17 +95,19 @@ impl Controller {
                 last.speed = driven;
             }
         }
-        self.check_response(now, &sample);
+        self.check_watch(now, &sample, trace);
     }
 
-    /// Holds if the width of the bead that is being laid does not answer the speed.
-    fn check_response(&mut self, now: Stamp, sample: &WidthSample) {
-        let Some(response) = &mut self.response else { return };
+    /// Holds if the width of the bead that is being laid does not answer the speed, and records an
+    /// offset that is wrong.
+    fn check_watch(&mut self, now: Stamp, sample: &WidthSample, trace: &mut Trace) {
+        let Some(watch) = &mut self.watch else { return };
         let Some(path) = sample.nozzle_path.filter(|_| sample.is_own_bead) else { return };
         let target = sample.reading.width - sample.error;
-        let found = response.measured(path, sample.reading, target);
+        let found = watch.measured(path, sample.reading, target);
+        trace.wrong_offset = found.wrong_offset;
         let factor = self.speed_override(now).unwrap_or(NO_OVERRIDE).max(MIN_OVERRIDE);
-        if let Some(found) = found
+        if let Some(found) = found.no_response
             && let Some(bead) = self.phase.bead_mut()
             && bead.tracked().is_some()
         {

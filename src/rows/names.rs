@@ -3,7 +3,7 @@
 use crate::control::{Fault, Hold};
 use crate::extruder::ExtruderFault;
 use crate::width_control::distance::FallbackReason;
-use crate::width_control::response::NoResponse;
+use crate::width_control::watch::{NoResponse, WrongOffset};
 
 /// Name of a limit, or of a reason without details.
 pub fn of(value: impl Into<&'static str>) -> &'static str {
@@ -18,6 +18,17 @@ pub fn fault(fault: &Fault) -> String {
         Fault::Extruder(why) => format!("{name}_{}", extruder_fault(*why)),
         _ => name.to_owned(),
     }
+}
+
+/// A wrong offset for people: the facts, and what to do.
+pub fn wrong_offset_in_words(wrong: WrongOffset) -> String {
+    let WrongOffset { found_mm, stated_mm } = wrong;
+    format!(
+        "the widths follow the speed as if the camera looked about {:.0} mm behind the nozzle, \
+         [camera] offset_mm is {:.1}; measure it with truebead camera offset",
+        found_mm.get(),
+        stated_mm.get()
+    )
 }
 
 /// A hold for people: its name, the facts, and what to do.

@@ -309,7 +309,6 @@ impl<K: Recorder> SimCell<K> {
     ///
     /// Without a commanded extruder the flow follows the speed while the robot starts: the bead
     /// begins with the width of the start speed.
-    /// the bead begins with the width of the start speed.
     fn equivalent_speed(&mut self, speed: f64) -> Option<f64> {
         let now = self.now;
         let Some(nominal) = self.nominal_flow else {

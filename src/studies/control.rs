@@ -6,6 +6,7 @@ pub mod bead_figures;
 mod latency;
 pub mod live;
 mod mismatch;
+mod offset;
 pub mod plant;
 mod pressure;
 mod pulsation;
@@ -31,6 +32,8 @@ pub enum Case {
     Mismatch,
     /// Another bead in view, and beads on which nothing is wrong.
     Response,
+    /// An offset that is a fifth off.
+    Offset,
     /// A camera whose frames are stamped late, its offset and latency found from steps of the speed.
     Latency,
     /// The pressure loop with a plant and a sensor that are not its model's.
@@ -45,6 +48,7 @@ impl Case {
             Self::Pulsation => pulsation::rows,
             Self::Mismatch => mismatch::rows,
             Self::Response => response::rows,
+            Self::Offset => offset::rows,
             Self::Latency => latency::rows,
             Self::Pressure => return pressure::rows(seeds, progress),
         };
@@ -82,6 +86,15 @@ mod tests {
     fn a_width_that_does_not_answer_is_noticed_and_no_other_bead_is_held() {
         for cell in LoopCell::ALL.into_iter().filter(|cell| cell.is_fast()) {
             let rows = response::rows(cell, 12).unwrap();
+            let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
+            assert!(missed.is_empty(), "{missed:#?}");
+        }
+    }
+
+    #[test]
+    fn an_offset_that_is_a_fifth_wrong_is_noticed() {
+        for cell in LoopCell::ALL.into_iter().filter(|cell| cell.is_fast()) {
+            let rows = offset::rows(cell, 20).unwrap();
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
             assert!(missed.is_empty(), "{missed:#?}");
         }

@@ -1,11 +1,13 @@
 //! What an operator hears while a run goes on: a new state with its reason, a speed limit that
-//! keeps the width from its target, and a width controller that falls back.
+//! keeps the width from its target, a width controller that falls back, and a camera offset that is
+//! wrong.
 
 use crate::control::{Command, State, Step};
 use crate::core::{MmPerS, Span, Stamp};
 use crate::rows::names;
 use crate::width_control::distance::FallbackReason;
 use crate::width_control::limiter::SpeedLimit;
+use crate::width_control::watch::WrongOffset;
 
 /// How long a speed limit must act, or not act, before it is reported
 /// (`docs/src/how-to/run-a-cell.md`, § What the controller does, and when it stops). A shorter time
@@ -17,6 +19,7 @@ const LIMIT_DELAY: Span = Span::from_millis(500);
 pub struct Notices {
     state: Option<State>,
     fallback: Option<FallbackReason>,
+    wrong_offset: Option<WrongOffset>,
     limit: LimitNotice,
 }
 
@@ -36,7 +39,12 @@ impl Notices {
 
     /// The sentences for a step; none where it brings nothing new.
     pub fn of(&mut self, now: Stamp, step: &Step) -> Vec<String> {
-        let words = [self.of_state(step), self.of_fallback(step), self.limit.of(now, step)];
+        let words = [
+            self.of_state(step),
+            self.of_fallback(step),
+            self.of_offset(step),
+            self.limit.of(now, step),
+        ];
         words.into_iter().flatten().map(|words| format!("{:8.2} s  {words}", now.secs())).collect()
     }
 
@@ -56,6 +64,12 @@ impl Notices {
         let before = std::mem::replace(&mut self.fallback, step.trace.fallback);
         let why = step.trace.fallback.filter(|why| before != Some(*why))?;
         Some(format!("PI control takes over for the rest of the bead: {}", names::fallback(why)))
+    }
+
+    fn of_offset(&mut self, step: &Step) -> Option<String> {
+        let wrong = step.trace.wrong_offset.filter(|_| self.wrong_offset.is_none())?;
+        self.wrong_offset = Some(wrong);
+        Some(format!("warning: {}", names::wrong_offset_in_words(wrong)))
     }
 }
 
@@ -104,6 +118,7 @@ fn at_limit(limit: SpeedLimit, speed: MmPerS, demand: MmPerS) -> String {
 mod tests {
     use super::*;
     use crate::control::Trace;
+    use crate::core::Mm;
 
     fn at(s: f64) -> Stamp {
         Stamp::from_secs(s)
@@ -156,5 +171,17 @@ mod tests {
         let words = notices.of(at(0.1), &fallen);
         assert!(words[0].contains("the robot reports no path"), "{words:?}");
         assert!(notices.of(at(0.2), &fallen).is_empty());
+    }
+
+    #[test]
+    fn a_wrong_offset_is_reported_once() {
+        let mut notices = Notices::default();
+        let mut warned = step(80.0, 80.0, SpeedLimit::None);
+        assert_eq!(notices.of(at(0.0), &warned).len(), 1);
+        let (found_mm, stated_mm) = (Mm::constant(73.7), Mm::constant(88.4));
+        warned.trace.wrong_offset = Some(WrongOffset { found_mm, stated_mm });
+        let words = notices.of(at(0.1), &warned);
+        assert!(words[0].contains("about 74 mm") && words[0].contains("is 88.4"), "{words:?}");
+        assert!(notices.of(at(0.2), &warned).is_empty());
     }
 }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::extruder::ExtruderFault;
 use crate::report::html::{VerdictLevel, number};
-use crate::rows::names::{extruder_fault, in_words};
+use crate::rows::names::{extruder_fault, in_words, wrong_offset_in_words};
 use crate::rows::summary::{ControlSummary, ExtruderSummary, ProfileSummary, Summary};
 
 /// Width error above which the verdict mentions it, as a fraction of the target.
@@ -232,6 +232,10 @@ fn control_sentences(control: &ControlSummary) -> (VerdictLevel, Vec<String>) {
     }
     if control.limited_s >= 0.05 {
         sentences.push(format!("Speed limited for {:.1} s.", control.limited_s));
+    }
+    if let Some(wrong) = control.wrong_offset {
+        level = level.max(VerdictLevel::Caution);
+        sentences.push(format!("A warning: {}.", wrong_offset_in_words(wrong)));
     }
     if control.records_lost > 0 {
         level = level.max(VerdictLevel::Caution);

@@ -14,6 +14,7 @@ use crate::numeric::statistics::{Distribution, Moments};
 use crate::rows::frame_row::FrameRow;
 use crate::rows::names;
 use crate::width_control::limiter::SpeedLimit;
+use crate::width_control::watch::WrongOffset;
 
 /// Path length after the start of control from which the bead counts as settled, by the contract
 /// of `summary.json` for `width_error_rms_settled_mm`.
@@ -48,6 +49,8 @@ pub struct ControlSummary {
     pub faults: u64,
     /// Number of faults for each reason.
     pub fault_reasons: BTreeMap<String, u64>,
+    /// The camera offset that fits the widths better than the stated one, where one does.
+    pub wrong_offset: Option<WrongOffset>,
     /// Time in each state.
     pub states_s: BTreeMap<&'static str, f64>,
     /// Latency: time from receiving a frame until the first setpoint that uses it is written, less
@@ -121,6 +124,7 @@ pub struct ControlTally {
     records_lost: u64,
     links: u64,
     reports_ignored: u64,
+    wrong_offset: Option<WrongOffset>,
 }
 
 /// Path of the current bead at which control began.
@@ -168,6 +172,7 @@ impl ControlTally {
             self.links += 1;
         }
         self.reports_ignored += u64::from(step.trace.report_ignored);
+        self.wrong_offset = self.wrong_offset.or(step.trace.wrong_offset);
         let before = self.follower.state().clone();
         if let Some(lapse) = self.follower.step(now, event, step) {
             self.add_time(&lapse);
@@ -235,6 +240,7 @@ impl ControlTally {
             held_for_s: self.held_for.seconds(),
             faults: self.fault_reasons.values().sum(),
             fault_reasons: self.fault_reasons.clone(),
+            wrong_offset: self.wrong_offset,
             states_s: self.states.seconds(),
             latency_ms: Quantiles::of(&self.latency),
             send_wait_ms: Quantiles::of(&self.send_wait),

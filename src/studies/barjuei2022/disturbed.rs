@@ -31,7 +31,7 @@ const ROUGHNESS: EdgeRoughness = EdgeRoughness { sigma_mm: 0.1, length_mm: 5.0 }
 /// Largest acceleration of a robot. Derived: as above.
 const ACCELERATION: MmPerS2 = MmPerS2::constant(2000.0);
 
-/// The cell with the noise of real measurements, a bead that is rough, and a robot with limited
+/// The cell with the noise of rendered frames, a bead that is rough, and a robot with limited
 /// acceleration.
 pub fn realistic(cell: &Cell, run: &RunPart) -> (Cell, RunPart) {
     let (mut cell, mut run) = (cell.clone(), run.clone());

@@ -31,14 +31,30 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
     for (control, name) in [(Control::Distance, "by distance"), (Control::Pi, "by PI")] {
         rows.extend(fault_rows(cell, &format!("another bead in view, {name}"), seeds, control)?);
         let sound = observe(seeds, |seed| disturbed(cell, control, seed))?;
-        let held = sound.iter().filter(|one| one.held_mm.is_some()).count();
+        let alarms: Vec<CaseRow> = (0..seeds)
+            .zip(&sound)
+            .filter_map(|(seed, one)| {
+                alarm_row(cell, &format!("no fault, {name}, seed {seed}"), one)
+            })
+            .collect();
         let lasted_s: f64 = sound.iter().map(|one| one.lasted_s).sum();
-        let value = THOUSAND_HOURS_S * to_f64(held) / lasted_s;
+        let value = THOUSAND_HOURS_S * to_f64(alarms.len()) / lasted_s;
         let quantity = Quantity::ratio("false alarms in 1,000 h");
         let case = format!("no fault, {name}");
         rows.push(CaseRow::new(cell, &case, quantity, sound.len(), value, 10.0));
+        rows.extend(alarms);
     }
     Ok(rows)
+}
+
+/// Where on a bead without a fault control held or warned.
+fn alarm_row(cell: LoopCell, case: &str, noticed: &Noticed) -> Option<CaseRow> {
+    let (what, path_mm) = match (noticed.held_mm, noticed.warned_mm) {
+        (Some(path_mm), _) => ("held: no response", path_mm),
+        (None, Some(path_mm)) => ("warned: wrong offset", path_mm),
+        (None, None) => return None,
+    };
+    Some(CaseRow::new(cell, case, Quantity::mm(what), 1, path_mm, f64::INFINITY))
 }
 
 fn fault_rows(
@@ -111,6 +127,8 @@ struct Noticed {
     commanded_mm: Option<f64>,
     /// Where control held because the width does not answer.
     held_mm: Option<f64>,
+    /// Where the offset was called wrong.
+    warned_mm: Option<f64>,
     lasted_s: f64,
 }
 
@@ -155,6 +173,9 @@ impl Observer for Noticed {
         }
         if matches!(step.state, State::Holding(Hold::NoResponse(_))) {
             self.held_mm.get_or_insert(self.path_mm);
+        }
+        if step.trace.wrong_offset.is_some() {
+            self.warned_mm.get_or_insert(self.path_mm);
         }
     }
 

@@ -22,7 +22,7 @@ pub struct CaseRow {
     /// Half of its confidence interval of 95 %, where it is a mean over the beads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
-    /// Largest value that is required.
+    /// Largest value that is required; infinite where none is.
     pub required: f64,
 }
 
@@ -100,10 +100,15 @@ pub fn plain(rows: &[CaseRow]) -> String {
     let line = |row: &CaseRow| {
         let value = row.value.map_or("never".to_owned(), |value| format!("{value:.4}"));
         let confidence = row.confidence.map_or(String::new(), |half| format!("±{half:.4}"));
+        let required = if row.required.is_finite() {
+            format!("at most {:.4}", row.required)
+        } else {
+            String::new()
+        };
         let met = if row.is_met() { "" } else { "  MISSED" };
         format!(
-            "{:case_width$}  {:18}  {:quantity_width$}  {value:>10} {confidence:8} {:5}  at most {:.4}{met}\n",
-            row.case, row.cell, row.quantity, row.unit, row.required
+            "{:case_width$}  {:18}  {:quantity_width$}  {value:>10} {confidence:8} {:5}  {required}{met}\n",
+            row.case, row.cell, row.quantity, row.unit
         )
     };
     rows.iter().map(line).collect()

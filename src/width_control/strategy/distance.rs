@@ -70,6 +70,10 @@ impl WidthStrategy for DistanceStrategy {
         })
     }
 
+    fn exponent(&self) -> Option<f64> {
+        Some(self.exponent)
+    }
+
     fn sees_only_laid_bead(&self) -> bool {
         true
     }

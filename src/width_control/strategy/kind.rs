@@ -42,6 +42,11 @@ pub trait WidthStrategy: Any + Debug + Send + Sync {
         true
     }
 
+    /// b in w = A·(v/v₀)^−b, where the cell states it.
+    fn exponent(&self) -> Option<f64> {
+        None
+    }
+
     /// Whether the whole gauge must lie on bead that is laid, not beside the nozzle.
     fn sees_only_laid_bead(&self) -> bool {
         false

@@ -43,7 +43,7 @@ struct NoiseLevel {
 }
 
 impl NoiseLevel {
-    /// The noise that was fitted to the paper's tables, and that of real measurements.
+    /// The noise that was fitted to the paper's tables, and that of rendered frames.
     fn both(work: &Experiments) -> [Self; 2] {
         let (cell, run) = realistic(&work.cell, &work.run);
         [

@@ -11,8 +11,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::core::{Mm, MmPerS};
 use crate::numeric::rank;
-use crate::width_control::bead_noise::{BeadRoughness, WidthNoise};
-use crate::width_control::controller::BeadReport;
 use crate::width_control::distance::WidthReading;
 use crate::width_control::speed_history::SpeedHistory;
 
@@ -40,19 +38,6 @@ const MAX_RANGE_SIGMAS: f64 = 7.0;
 /// control has cancelled for a missing answer.
 const MIN_ERROR: f64 = 0.01;
 
-/// What the test is made for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ResponseSettings {
-    /// Path length from the nozzle back to the middle of the gauge.
-    pub offset: Mm,
-    /// Length of bead that one width is the mean of.
-    pub gauge: Mm,
-    /// Any speed: only ratios matter.
-    pub reference_speed: MmPerS,
-    /// Roughness of the bead.
-    pub roughness: BeadRoughness,
-}
-
 /// A change of the speed without effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoResponse {
@@ -69,8 +54,8 @@ pub struct NoResponse {
 /// The test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseTest {
-    settings: ResponseSettings,
-    speeds: SpeedHistory,
+    offset_mm: f64,
+    gauge_mm: f64,
     /// Variance of ln w of a width by the roughness.
     roughness: f64,
     /// The latest widths, oldest first, over the path on which an answer is looked for.
@@ -97,44 +82,33 @@ struct Change {
 }
 
 impl ResponseTest {
-    /// Before the first report.
-    pub fn new(settings: ResponseSettings) -> Self {
-        let ResponseSettings { offset, gauge, reference_speed, roughness } = settings;
-        let kept_mm = (1.0 + OFFSET_ERROR) * offset.get() + gauge.get();
-        Self {
-            settings,
-            speeds: SpeedHistory::new(reference_speed.get(), kept_mm),
-            roughness: WidthNoise::new(roughness, gauge.get()).variance(f64::INFINITY),
-            widths: VecDeque::new(),
-            changes: VecDeque::new(),
-        }
+    /// Before the first width: the camera's offset, the length of the gauge, and the variance of ln w
+    /// by the roughness over it.
+    pub fn new(offset: Mm, gauge: Mm, roughness: f64) -> Self {
+        let (offset_mm, gauge_mm) = (offset.get(), gauge.get());
+        let (widths, changes) = (VecDeque::new(), VecDeque::new());
+        Self { offset_mm, gauge_mm, roughness, widths, changes }
     }
 
     /// A new bead, or one that goes on elsewhere.
     pub fn begin_bead(&mut self) {
-        self.speeds.clear();
         self.widths.clear();
         self.changes.clear();
     }
 
-    /// The robot reported while it lays bead.
-    pub fn reported(&mut self, report: &BeadReport) {
-        let BeadReport { at, path, speed, flow_ratio } = *report;
-        self.speeds.report(at.secs(), path.get(), speed.get(), flow_ratio);
-    }
-
-    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the target width
-    /// of that bead. Returns the change of the speed that has had no effect, where there is one.
+    /// A width of the bead about a position, by the stated offset, and its target. Returns the change
+    /// of the speed that has had no effect, where there is one.
     pub fn measured(
         &mut self,
-        nozzle_path: Mm,
+        speeds: &SpeedHistory,
+        position_mm: f64,
         reading: WidthReading,
         target: Mm,
     ) -> Option<NoResponse> {
-        if reading.width <= Mm::ZERO || target <= Mm::ZERO {
+        if target <= Mm::ZERO {
             return None;
         }
-        let newest = self.matched((nozzle_path - self.settings.offset).get(), reading.width)?;
+        let newest = self.matched(speeds, position_mm, reading.width)?;
         let before = self.widths.back().map(|last| last.position_mm);
         if before.is_some_and(|before| before >= newest.position_mm) {
             return None;
@@ -150,7 +124,12 @@ impl ResponseTest {
         }
         let oldest = oldest?;
         self.widths.push_front(oldest);
-        let found = self.compare(&oldest, &newest, reading, target);
+        let found = self.compare(&oldest, &newest, reading, target).map(|over_mm| NoResponse {
+            speed_change: libm::expm1(newest.ln_speeds[0] - oldest.ln_speeds[0]),
+            width_change: libm::expm1(newest.ln_width - oldest.ln_width),
+            over_mm,
+            speed_before: speeds.speed_of(oldest.ln_speeds[0]),
+        });
         self.remember(&oldest, &newest);
         found
     }
@@ -158,14 +137,14 @@ impl ResponseTest {
     /// Path within which a change of the speed is seen whole, wherever the camera looks within its
     /// error \[mm\].
     fn span_mm(&self) -> f64 {
-        2.0 * OFFSET_ERROR * self.settings.offset.get() + self.settings.gauge.get()
+        2.0 * OFFSET_ERROR * self.offset_mm + self.gauge_mm
     }
 
-    fn matched(&self, position_mm: f64, width: Mm) -> Option<MatchedWidth> {
-        let half = 0.5 * self.settings.gauge.get();
-        let shift = OFFSET_ERROR * self.settings.offset.get();
-        let at = |by: f64| self.speeds.mean_near(position_mm + by - half, position_mm + by + half);
-        let known = self.speeds.mean_over(position_mm - half, position_mm + half)?;
+    fn matched(&self, speeds: &SpeedHistory, position_mm: f64, width: Mm) -> Option<MatchedWidth> {
+        let half = 0.5 * self.gauge_mm;
+        let shift = OFFSET_ERROR * self.offset_mm;
+        let at = |by: f64| speeds.mean_near(position_mm + by - half, position_mm + by + half);
+        let known = speeds.mean_over(position_mm - half, position_mm + half)?;
         let ln_speeds = [known.mean, at(shift)?.mean, at(-shift)?.mean];
         Some(MatchedWidth { position_mm, ln_width: libm::log(width.get()), ln_speeds })
     }
@@ -195,13 +174,15 @@ impl ResponseTest {
         EXPONENTS.into_iter().filter_map(median).min_by(f64::total_cmp)
     }
 
+    /// The path on which the speed has changed and the width has not \[mm\], where the flow has no
+    /// reason for it.
     fn compare(
         &self,
         oldest: &MatchedWidth,
         newest: &MatchedWidth,
         reading: WidthReading,
         target: Mm,
-    ) -> Option<NoResponse> {
+    ) -> Option<f64> {
         let change = newest.speed_change(oldest);
         let measurement = reading.sigma / reading.width;
         let sigma = (self.roughness + measurement * measurement).sqrt();
@@ -216,12 +197,8 @@ impl ResponseTest {
         if most - least > same || answer < same || !is_off {
             return None;
         }
-        (answer > MIN_CHANGES * self.usual_change()?).then(|| NoResponse {
-            speed_change: libm::expm1(newest.ln_speeds[0] - oldest.ln_speeds[0]),
-            width_change: libm::expm1(newest.ln_width - oldest.ln_width),
-            over_mm: newest.position_mm - oldest.position_mm,
-            speed_before: self.speeds.speed_of(oldest.ln_speeds[0]),
-        })
+        (answer > MIN_CHANGES * self.usual_change()?)
+            .then_some(newest.position_mm - oldest.position_mm)
     }
 }
 
@@ -239,6 +216,9 @@ mod tests {
     use super::*;
     use crate::core::Stamp;
     use crate::sim::hash;
+    use crate::width_control::bead_noise::BeadRoughness;
+    use crate::width_control::controller::BeadReport;
+    use crate::width_control::watch::{BeadWatch, WatchSettings};
 
     const OFFSET_MM: f64 = 88.4;
     const GAUGE_MM: f64 = 12.7;
@@ -262,10 +242,11 @@ mod tests {
 
     /// Path beyond the step until it is noticed that the width does not answer \[mm\].
     fn noticed_after(seen: Seen) -> Option<f64> {
-        let mut test = ResponseTest::new(ResponseSettings {
+        let mut test = BeadWatch::new(WatchSettings {
             offset: Mm::constant(OFFSET_MM),
             gauge: Mm::constant(GAUGE_MM),
             reference_speed: MmPerS::constant(100.0),
+            exponent: None,
             roughness: BeadRoughness { ratio: 0.0025, length_mm: 5.0 },
         });
         let (mut path, mut at) = (0.0, 0.0);
@@ -288,7 +269,7 @@ mod tests {
                 width: Mm::constant(42.0 * seen.ratio * ln_width.exp()),
                 sigma: Mm::constant(0.003),
             };
-            let found = test.measured(Mm::constant(path), reading, Mm::constant(42.0));
+            let found = test.measured(Mm::constant(path), reading, Mm::constant(42.0)).no_response;
             if let Some(found) = found {
                 assert!((found.speed_change - 0.25).abs() < 0.05, "{found:?}");
                 assert!(found.width_change.abs() < 0.01, "{found:?}");

@@ -1,0 +1,139 @@
+//! Whether it is noticed that the camera's offset is wrong.
+
+use rayon::prelude::*;
+
+use super::plant::{Control, Draw, LoopCell, Plan};
+use super::table::{CaseRow, Quantity, quantile};
+use crate::control::{Command, Event, Step};
+use crate::core::{Mm, Stamp};
+use crate::numeric::number::to_f64;
+use crate::run::runner::NoRecorder;
+use crate::sim::cell::{FrameObservation, Observer, SimCell};
+use crate::studies::barjuei2022::scale;
+use crate::studies::error::ReproduceError;
+
+/// Length of a bead \[mm\]. Derived: it holds the start, a step of the flow, and the offset behind both.
+const LENGTH_MM: f64 = 3000.0;
+/// Error of the offset, as a fraction. Derived: two standard deviations of an offset of which the cell
+/// states no more.
+const ERROR: f64 = 0.2;
+/// Change of ln v that shows it. Derived: 2.5 % of the width with the exponent of Shojaei Barjuei et al.
+/// 2022, ten times the roughness of a bead.
+const CHANGE: f64 = 0.10;
+/// Changes after which it must be noticed. Derived: one may be the flow's.
+const CHANGES: usize = 2;
+
+/// The rows of a cell. Under PI control the offset is not tested.
+pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let all: Vec<Warned> = (0..seeds)
+        .into_par_iter()
+        .map(|seed| Warned::on(cell, seed))
+        .collect::<Result<_, ReproduceError>>()?;
+    let shown: Vec<&Warned> = all.iter().filter(|one| one.passed_mm().is_some()).collect();
+    let late = to_f64(shown.iter().filter(|one| one.is_late()).count());
+    let after: Vec<f64> = shown.iter().map(|one| one.after_mm()).collect();
+    let row = |quantity, value, required| {
+        CaseRow::new(cell, "offset 20 % wrong", quantity, shown.len(), value, required)
+    };
+    let fraction = Quantity::ratio("fraction not noticed in time");
+    let noticed = Quantity::mm("noticed after the second change, median");
+    Ok(vec![
+        row(fraction, late / to_f64(shown.len()), 0.05),
+        row(noticed, quantile(&after, 0.5), f64::INFINITY),
+    ])
+}
+
+/// The controller looks in the wrong place, and the flow steps.
+fn plan(cell: LoopCell, seed: u64) -> Result<Plan, ReproduceError> {
+    let mut plan = Plan::new(cell, Control::Distance)?.long(LENGTH_MM);
+    let draw = Draw { stream: OFFSET_STREAM, seed };
+    plan.assumed_offset = 1.0 + ERROR * draw.sign(0);
+    let flow = &mut plan.cell.simulation.flow;
+    flow.step_at_mm = draw.between(1, 800.0, 2000.0);
+    flow.step_ratio = 1.0 + 0.08 * draw.sign(2);
+    Ok(plan)
+}
+
+/// When it was noticed. Paths count from the beginning of the bead \[mm\].
+#[derive(Debug, Clone, PartialEq)]
+struct Warned {
+    offset_mm: f64,
+    /// Path beyond the offset within which a change is seen.
+    seen_within_mm: f64,
+    start_mm: Option<f64>,
+    path_mm: f64,
+    /// The commanded ln v at the last change.
+    ln_speed: f64,
+    /// Where ln v had changed by [`CHANGE`], apart from changes that are seen together.
+    changes_mm: Vec<f64>,
+    noticed_mm: Option<f64>,
+}
+
+impl Warned {
+    fn on(cell: LoopCell, seed: u64) -> Result<Self, ReproduceError> {
+        let plan = plan(cell, seed)?;
+        let mut cell = plan.cell.clone();
+        cell.simulation.seed = seed + 1;
+        let offset_mm = plan.run.camera.offset.get();
+        let seen_within_mm = ERROR * offset_mm + 2.0 * cell.simulation.gauge_length.get();
+        let mut warned = Self {
+            offset_mm,
+            seen_within_mm,
+            start_mm: None,
+            path_mm: 0.0,
+            ln_speed: plan.run.robot.start_speed.get().ln(),
+            changes_mm: Vec::new(),
+            noticed_mm: None,
+        };
+        let factor = plan.assumed_offset;
+        let mut sim = SimCell::mismatched(&cell, &plan.run, factor, scale(), NoRecorder)?;
+        let _ = sim.layer(Mm::ZERO, &mut warned);
+        Ok(warned)
+    }
+
+    /// Where the nozzle was when the last change that must show the error had been seen whole \[mm\].
+    fn passed_mm(&self) -> Option<f64> {
+        let last = self.changes_mm.get(CHANGES - 1)?;
+        Some(last + self.offset_mm + self.seen_within_mm).filter(|passed| *passed < LENGTH_MM)
+    }
+
+    fn is_late(&self) -> bool {
+        self.passed_mm() < self.noticed_mm.or(Some(f64::INFINITY))
+    }
+
+    /// Path from the second change until it was noticed \[mm\]; infinite if it never was.
+    fn after_mm(&self) -> f64 {
+        let last = self.changes_mm.get(CHANGES - 1).copied().unwrap_or_default();
+        self.noticed_mm.map_or(f64::INFINITY, |warned| warned - last)
+    }
+}
+
+impl Observer for Warned {
+    fn step(&mut self, _: Stamp, event: &Event, step: &Step) {
+        if let Event::Robot(state) = event
+            && state.mode.lays_bead()
+        {
+            let start = *self.start_mm.get_or_insert(state.path_mm.get());
+            self.path_mm = state.path_mm.get() - start;
+        }
+        if let Some(Command::Speed(speed)) = step.command {
+            let ln_speed = speed.get().ln();
+            let apart =
+                self.changes_mm.last().is_none_or(|last| self.path_mm - last > self.seen_within_mm);
+            if (ln_speed - self.ln_speed).abs() >= CHANGE {
+                self.ln_speed = ln_speed;
+                if apart {
+                    self.changes_mm.push(self.path_mm);
+                }
+            }
+        }
+        if step.trace.wrong_offset.is_some() {
+            self.noticed_mm.get_or_insert(self.path_mm);
+        }
+    }
+
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
+}
+
+/// Random stream of what is drawn. Derived: the bytes of "offset".
+const OFFSET_STREAM: u64 = 0x6f66_6673_6574;
