@@ -64,8 +64,6 @@ pub struct FlowPulsation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Hypothesis {
     bead: PulsatingBead,
-    /// Its drift over the stated one, as a variance.
-    drift_ratio: f64,
     /// Logarithm of its likelihood over that of the likeliest.
     log_ratio: f64,
     weight: f64,
@@ -75,14 +73,15 @@ impl FlowPulsation {
     /// Before the first width.
     pub fn new(exponent: Exponent) -> Self {
         let (shortest, longest) = PERIODS_S;
-        let steady =
-            DRIFT_RATIOS.map(|ratio| Hypothesis::new(f64::INFINITY, ratio, exponent)).into_iter();
+        let steady = DRIFT_RATIOS
+            .map(|ratio| PulsatingBead::new(f64::INFINITY, ratio, exponent))
+            .into_iter();
         let periods = std::iter::successors(Some(shortest), |period| Some(period * PERIOD_RATIO));
         let pulsating = periods
             .take_while(|period| *period < longest)
-            .map(|period| Hypothesis::new(period, 1.0, exponent));
+            .map(|period| PulsatingBead::new(period, 1.0, exponent));
         Self {
-            hypotheses: steady.chain(pulsating).collect(),
+            hypotheses: steady.chain(pulsating).map(Hypothesis::new).collect(),
             last_s: None,
             lasted_s: 0.0,
             seen_s: None,
@@ -121,19 +120,18 @@ impl FlowPulsation {
     }
 
     fn weigh(&mut self) {
-        let largest = |of: fn(&Hypothesis) -> f64, all: &[Hypothesis]| {
-            all.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+        let largest = |of: fn(&Hypothesis) -> f64| {
+            self.hypotheses.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
         };
-        let likeliest = largest(|one| one.log_ratio, &self.hypotheses);
+        let likeliest = largest(|one| one.log_ratio);
+        let most_probable = largest(Hypothesis::log_odds) - likeliest;
+        let mut total = 0.0;
         for one in &mut self.hypotheses {
             one.log_ratio = (one.log_ratio - likeliest).max(-PRIOR_LOG_ODDS - one.log_prior());
-        }
-        let most_probable = largest(Hypothesis::log_odds, &self.hypotheses);
-        for one in &mut self.hypotheses {
             let less = one.log_odds() - most_probable;
             one.weight = if less > -PRIOR_LOG_ODDS { libm::exp(less) } else { 0.0 };
+            total += one.weight;
         }
-        let total: f64 = self.hypotheses.iter().map(|one| one.weight).sum();
         for one in &mut self.hypotheses {
             one.weight /= total;
         }
@@ -216,15 +214,13 @@ impl FlowPulsation {
 }
 
 impl Hypothesis {
-    fn new(period_s: f64, drift_ratio: f64, exponent: Exponent) -> Self {
-        let bead = PulsatingBead::new(period_s, exponent);
-        Self { bead, drift_ratio, log_ratio: 0.0, weight: 0.0 }
+    fn new(bead: PulsatingBead) -> Self {
+        Self { bead, log_ratio: 0.0, weight: 0.0 }
     }
 
     fn update(&mut self, passed_s: f64, one: &PulsationSample) {
-        let sample = PulsationSample { drift: one.drift * self.drift_ratio, ..*one };
         let kept = 1.0 - (passed_s / MEMORY_S).min(1.0);
-        self.log_ratio = self.log_ratio * kept + self.bead.update(passed_s, &sample);
+        self.log_ratio = self.log_ratio * kept + self.bead.update(passed_s, one);
     }
 
     fn log_prior(&self) -> f64 {
