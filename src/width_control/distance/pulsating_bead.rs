@@ -1,13 +1,14 @@
 //! A bead whose flow pulsates with a known period: a Kalman filter on ln A, on b and on the two
 //! components of the harmonic. They are estimated together: a wrong b is an error of the level
 //! where the speed changes, and would be taken for a pulsation.
+//!
+//! The period and all lengths of time have one unit: seconds, or pulses of a screw.
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, TAU};
 
 use nalgebra::{Matrix4, UnitComplex, Vector4};
 
 use super::exponent::Exponent;
-use super::pulsation::PulsationSample;
 use super::width_model::{MAX_SQUARED_INNOVATION, MIN_LN_SPEED_DIFFERENCE, WiderExponent};
 
 /// Initial standard deviation of either component, as a fraction of the width: pulsations of
@@ -19,10 +20,36 @@ const DRIFT_PER_ROOT_RAD: f64 = 2e-4;
 /// Initial standard deviation of the level.
 const LEVEL_SIGMA: f64 = 0.1;
 
+/// What a width says of a pulsation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PulsationSample {
+    /// When the middle of its gauge was laid \[s\].
+    pub laid_s: f64,
+    /// How long the nozzle took for the gauge \[s\].
+    pub lasted_s: f64,
+    /// ln w.
+    pub ln_width: f64,
+    /// ln(v/v₀).
+    pub ln_speed: f64,
+    /// Variance of `ln_width`.
+    pub variance: f64,
+    /// Variance of the drift since the last width.
+    pub drift: f64,
+}
+
+/// A piece of bead by when it was laid, in the unit of the period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaidInterval {
+    /// From the middle of the last width's piece to the middle of this one.
+    pub after_last: f64,
+    /// How long it took.
+    pub lasted: f64,
+}
+
 /// State: ln A, b, and the components of the harmonic at phase 0 and a quarter of a period later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulsatingBead {
-    rad_per_s: f64,
+    rad_per_unit: f64,
     /// Its drift over the stated one, as a variance.
     drift_ratio: f64,
     /// Of the last width.
@@ -34,11 +61,11 @@ pub struct PulsatingBead {
 }
 
 impl PulsatingBead {
-    /// For a period \[s\]; infinite for a bead without pulsation. Its flow drifts `drift_ratio` times
-    /// as much as stated, as a variance.
-    pub fn new(period_s: f64, drift_ratio: f64, exponent: Exponent) -> Self {
+    /// For a period; infinite for a bead without pulsation. Its flow drifts `drift_ratio` times as much
+    /// as stated, as a variance.
+    pub fn new(period: f64, drift_ratio: f64, exponent: Exponent) -> Self {
         let bead = Self {
-            rad_per_s: TAU / period_s,
+            rad_per_unit: TAU / period,
             drift_ratio,
             phase: UnitComplex::identity(),
             exponent,
@@ -65,18 +92,17 @@ impl PulsatingBead {
 
     /// Whether it has a pulsation.
     pub fn pulsates(&self) -> bool {
-        self.rad_per_s > 0.0
+        self.rad_per_unit > 0.0
     }
 
-    /// Period \[s\].
-    pub fn period_s(&self) -> f64 {
-        TAU / self.rad_per_s
+    /// Its period.
+    pub fn period(&self) -> f64 {
+        TAU / self.rad_per_unit
     }
 
-    /// Adds a width of bead laid `dt_s` after the last one. Returns its log likelihood, without the
-    /// constant.
-    pub fn update(&mut self, dt_s: f64, one: &PulsationSample) -> f64 {
-        let PulsationSample { lasted_s, ln_width, ln_speed, variance, drift, .. } = *one;
+    /// Adds a width. Returns its log likelihood, without the constant.
+    pub fn update(&mut self, laid: LaidInterval, one: &PulsationSample) -> f64 {
+        let PulsationSample { ln_width, ln_speed, variance, drift, .. } = *one;
         if !self.known {
             self.known = true;
             self.state.x = ln_width + self.state.y * ln_speed;
@@ -85,9 +111,9 @@ impl PulsatingBead {
             self.covariance.m11 += ln_speed * both;
             return 0.0;
         }
-        self.phase = self.phase_after(dt_s);
-        let harmonic = self.kept_over(lasted_s) * self.phase.as_ref();
-        let covariance = self.drifted(dt_s, drift);
+        self.phase = self.phase_after(laid.after_last);
+        let harmonic = self.kept_over(laid.lasted) * self.phase.as_ref();
+        let covariance = self.drifted(laid.after_last, drift);
         let predicts = Vector4::new(1.0, -ln_speed, harmonic.re, harmonic.im);
         let informs = Vector4::new(1.0, -self.informing_speed(ln_speed), harmonic.re, harmonic.im);
         let informed = covariance * informs;
@@ -114,15 +140,15 @@ impl PulsatingBead {
     }
 
     /// The covariance after a time in which ln A has drifted by a variance.
-    fn drifted(&self, dt_s: f64, drift: f64) -> Matrix4<f64> {
-        let part = 2.0 * DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * self.rad_per_s * dt_s;
+    fn drifted(&self, after_last: f64, drift: f64) -> Matrix4<f64> {
+        let part = 2.0 * DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * self.rad_per_unit * after_last;
         let drifts = Vector4::new(drift * self.drift_ratio, 0.0, part, part);
         self.covariance + Matrix4::from_diagonal(&drifts)
     }
 
-    /// Phase a time \[s\] after the last width.
-    fn phase_after(&self, dt_s: f64) -> UnitComplex<f64> {
-        let (sin, cos) = libm::sincos(self.rad_per_s * dt_s);
+    /// Phase a time after the last width.
+    fn phase_after(&self, after_last: f64) -> UnitComplex<f64> {
+        let (sin, cos) = libm::sincos(self.rad_per_unit * after_last);
         self.phase * UnitComplex::from_cos_sin_unchecked(cos, sin)
     }
 
@@ -156,27 +182,27 @@ impl PulsatingBead {
         by.widen(&mut self.covariance);
     }
 
-    /// What a mean over a time \[s\] keeps of the amplitude; negative where it inverts it.
-    pub fn kept_over(&self, lasted_s: f64) -> f64 {
-        let half = 0.5 * self.rad_per_s * lasted_s;
+    /// What a mean over a time keeps of the amplitude; negative where it inverts it.
+    pub fn kept_over(&self, lasted: f64) -> f64 {
+        let half = 0.5 * self.rad_per_unit * lasted;
         if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half }
     }
 
-    /// The pulsation of ln w, in the mean between two times after the last width \[s\].
-    pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
-        self.harmonic(from_s, to_s).dot(&self.state)
+    /// The pulsation of ln w in its mean over an interval.
+    pub fn mean(&self, over: LaidInterval) -> f64 {
+        self.harmonic(over).dot(&self.state)
     }
 
     /// Expected square of that mean.
-    pub fn mean_square(&self, from_s: f64, to_s: f64) -> f64 {
-        let harmonic = self.harmonic(from_s, to_s);
+    pub fn mean_square(&self, over: LaidInterval) -> f64 {
+        let harmonic = self.harmonic(over);
         harmonic.dot(&self.state).powi(2) + harmonic.dot(&(self.covariance * harmonic))
     }
 
-    /// By how much the state acts as a pulsation between two times after the last width \[s\].
-    fn harmonic(&self, from_s: f64, to_s: f64) -> Vector4<f64> {
-        let phase = self.phase_after(0.5 * (from_s + to_s));
-        Vector4::new(0.0, 0.0, phase.re, phase.im) * self.kept_over(to_s - from_s)
+    /// By how much the state acts as a pulsation in the mean over an interval.
+    fn harmonic(&self, over: LaidInterval) -> Vector4<f64> {
+        let phase = self.phase_after(over.after_last);
+        Vector4::new(0.0, 0.0, phase.re, phase.im) * self.kept_over(over.lasted)
     }
 }
 
@@ -198,8 +224,13 @@ mod tests {
 
     const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
 
-    fn sample(ln_width: f64, ln_speed: f64, lasted_s: f64) -> PulsationSample {
-        PulsationSample { laid_s: 0.0, lasted_s, ln_width, ln_speed, variance: 1e-6, drift: 1e-9 }
+    fn sample(ln_width: f64, ln_speed: f64) -> PulsationSample {
+        let (laid_s, lasted_s) = (0.0, 0.0);
+        PulsationSample { laid_s, lasted_s, ln_width, ln_speed, variance: 1e-6, drift: 1e-9 }
+    }
+
+    fn after(after_last: f64) -> LaidInterval {
+        LaidInterval { after_last, lasted: 0.0 }
     }
 
     #[test]
@@ -216,14 +247,14 @@ mod tests {
         let truth = |at: f64| 3.7 + 0.02 * (TAU * at / period + 0.4).sin();
         let mut bead = PulsatingBead::new(period, 1.0, EXPONENT);
         for k in 0..600 {
-            let _ = bead.update(0.02, &sample(truth(0.02 * f64::from(k)), 0.0, 0.0));
+            let _ = bead.update(after(0.02), &sample(truth(0.02 * f64::from(k)), 0.0));
         }
         let last = 0.02 * 599.0;
         for ahead in [0.0, 0.5, 1.3] {
-            let found = bead.mean(ahead, ahead) - (truth(last + ahead) - 3.7);
+            let found = bead.mean(after(ahead)) - (truth(last + ahead) - 3.7);
             assert!(found.abs() < 1e-4, "{ahead}: {found}");
         }
-        let mean = bead.mean(0.2, 0.2 + period);
+        let mean = bead.mean(LaidInterval { after_last: 0.2 + 0.5 * period, lasted: period });
         assert!(mean.abs() < 1e-9, "a whole period has no mean: {mean}");
     }
 
@@ -235,7 +266,7 @@ mod tests {
             let at = 0.02 * f64::from(k);
             let ln_speed = if at < 1.5 { 0.0 } else { -0.4 };
             let ln_width = 3.7 - exponent * ln_speed + 0.02 * (TAU * at / period).sin();
-            let _ = bead.update(0.02, &sample(ln_width, ln_speed, 0.0));
+            let _ = bead.update(after(0.02), &sample(ln_width, ln_speed));
         }
         assert!((bead.exponent() - exponent).abs() < 2e-3, "{bead:?}");
         assert!((bead.level() - 3.7).abs() < 1e-3);
@@ -246,7 +277,8 @@ mod tests {
         let mut bead = PulsatingBead::new(2.3, 1.0, EXPONENT);
         for k in 0..2000 {
             let [speed_noise, width_noise] = hash::normal_pair(hash::mix(&[5, k]));
-            let _ = bead.update(0.1, &sample(3.7 + 0.001 * width_noise, 0.002 * speed_noise, 0.0));
+            let _ =
+                bead.update(after(0.1), &sample(3.7 + 0.001 * width_noise, 0.002 * speed_noise));
         }
         assert!((bead.exponent() - EXPONENT.prior).abs() < 0.01, "{}", bead.exponent());
         assert!(bead.exponent_variance() > 0.8 * EXPONENT.prior_variance());
@@ -256,9 +288,9 @@ mod tests {
     fn a_steady_bead_has_no_pulsation() {
         let mut bead = PulsatingBead::new(f64::INFINITY, 1.0, EXPONENT);
         for k in 0..100 {
-            let _ = bead.update(0.1, &sample(3.7 + 0.01 * f64::from(k % 2), 0.0, 0.0));
+            let _ = bead.update(after(0.1), &sample(3.7 + 0.01 * f64::from(k % 2), 0.0));
         }
-        assert_eq!(bead.mean(0.3, 0.3), 0.0);
+        assert_eq!(bead.mean(after(0.3)), 0.0);
     }
 
     #[test]
@@ -269,9 +301,9 @@ mod tests {
         let mut bead = PulsatingBead::new(period, 1.0, EXPONENT);
         for k in 0..600 {
             let seen = 3.7 + truth(0.02 * f64::from(k)) * half.sin() / half;
-            let _ = bead.update(0.02, &sample(seen, 0.0, lasted));
+            let _ = bead.update(LaidInterval { after_last: 0.02, lasted }, &sample(seen, 0.0));
         }
-        let off = bead.mean(0.5, 0.5) - truth(0.02 * 599.0 + 0.5);
+        let off = bead.mean(after(0.5)) - truth(0.02 * 599.0 + 0.5);
         assert!(off.abs() < 1e-4, "{off}");
     }
 
@@ -280,10 +312,10 @@ mod tests {
         let mut bead = PulsatingBead::new(2.0, 1.0, EXPONENT);
         for k in 0..100 {
             let ln_speed = if k < 50 { 0.0 } else { -0.4 };
-            let _ = bead.update(0.1, &sample(3.7 - 0.3 * ln_speed, ln_speed, 0.0));
+            let _ = bead.update(after(0.1), &sample(3.7 - 0.3 * ln_speed, ln_speed));
         }
         let again = bead.begin_again();
         assert_eq!(again.exponent(), bead.exponent());
-        assert_eq!(again.mean(0.0, 0.0), 0.0);
+        assert_eq!(again.mean(after(0.0)), 0.0);
     }
 }
