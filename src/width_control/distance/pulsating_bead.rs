@@ -46,6 +46,28 @@ pub struct LaidInterval {
     pub lasted: f64,
 }
 
+/// By how much a harmonic turns from the last width to this one, and what this one shows of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Turn {
+    by: UnitComplex<f64>,
+    rad: f64,
+    /// What the mean over the gauge keeps of the amplitude; negative where it inverts it.
+    kept: f64,
+    cos_half_gauge: f64,
+}
+
+impl Turn {
+    /// Of a harmonic with twice the frequency, in less time than from the interval.
+    pub fn doubled(&self) -> Self {
+        Self {
+            by: self.by * self.by,
+            rad: 2.0 * self.rad,
+            kept: self.kept * self.cos_half_gauge,
+            cos_half_gauge: 2.0 * self.cos_half_gauge * self.cos_half_gauge - 1.0,
+        }
+    }
+}
+
 /// State: ln A, b, and the components of the harmonic at phase 0 and a quarter of a period later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulsatingBead {
@@ -100,8 +122,18 @@ impl PulsatingBead {
         TAU / self.rad_per_unit
     }
 
+    /// How its harmonic turns to an interval.
+    pub fn turn(&self, to: LaidInterval) -> Turn {
+        let rad = self.rad_per_unit * to.after_last;
+        let (sin, cos) = libm::sincos(rad);
+        let half = 0.5 * self.rad_per_unit * to.lasted;
+        let (sin_half, cos_half_gauge) = libm::sincos(half);
+        let kept = if half.abs() < 1e-9 { 1.0 } else { sin_half / half };
+        Turn { by: UnitComplex::from_cos_sin_unchecked(cos, sin), rad, kept, cos_half_gauge }
+    }
+
     /// Adds a width. Returns its log likelihood, without the constant.
-    pub fn update(&mut self, laid: LaidInterval, one: &PulsationSample) -> f64 {
+    pub fn update(&mut self, turn: &Turn, one: &PulsationSample) -> f64 {
         let PulsationSample { ln_width, ln_speed, variance, drift, .. } = *one;
         if !self.known {
             self.known = true;
@@ -111,9 +143,9 @@ impl PulsatingBead {
             self.covariance.m11 += ln_speed * both;
             return 0.0;
         }
-        self.phase = self.phase_after(laid.after_last);
-        let harmonic = self.kept_over(laid.lasted) * self.phase.as_ref();
-        let covariance = self.drifted(laid.after_last, drift);
+        self.phase *= turn.by;
+        let harmonic = turn.kept * self.phase.as_ref();
+        let covariance = self.drifted(turn.rad, drift);
         let predicts = Vector4::new(1.0, -ln_speed, harmonic.re, harmonic.im);
         let informs = Vector4::new(1.0, -self.informing_speed(ln_speed), harmonic.re, harmonic.im);
         let informed = covariance * informs;
@@ -139,17 +171,11 @@ impl PulsatingBead {
         if (ln_speed - known_best).abs() > MIN_LN_SPEED_DIFFERENCE { ln_speed } else { known_best }
     }
 
-    /// The covariance after a time in which ln A has drifted by a variance.
-    fn drifted(&self, after_last: f64, drift: f64) -> Matrix4<f64> {
-        let part = 2.0 * DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * self.rad_per_unit * after_last;
+    /// The covariance after an angle in which ln A has drifted by a variance.
+    fn drifted(&self, rad: f64, drift: f64) -> Matrix4<f64> {
+        let part = 2.0 * DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * rad;
         let drifts = Vector4::new(drift * self.drift_ratio, 0.0, part, part);
         self.covariance + Matrix4::from_diagonal(&drifts)
-    }
-
-    /// Phase a time after the last width.
-    fn phase_after(&self, after_last: f64) -> UnitComplex<f64> {
-        let (sin, cos) = libm::sincos(self.rad_per_unit * after_last);
-        self.phase * UnitComplex::from_cos_sin_unchecked(cos, sin)
     }
 
     /// ln A without the pulsation.
@@ -184,8 +210,7 @@ impl PulsatingBead {
 
     /// What a mean over a time keeps of the amplitude; negative where it inverts it.
     pub fn kept_over(&self, lasted: f64) -> f64 {
-        let half = 0.5 * self.rad_per_unit * lasted;
-        if half.abs() < 1e-9 { 1.0 } else { libm::sin(half) / half }
+        self.turn(LaidInterval { after_last: 0.0, lasted }).kept
     }
 
     /// The pulsation of ln w in its mean over an interval.
@@ -201,8 +226,9 @@ impl PulsatingBead {
 
     /// By how much the state acts as a pulsation in the mean over an interval.
     fn harmonic(&self, over: LaidInterval) -> Vector4<f64> {
-        let phase = self.phase_after(over.after_last);
-        Vector4::new(0.0, 0.0, phase.re, phase.im) * self.kept_over(over.lasted)
+        let turn = self.turn(over);
+        let phase = self.phase * turn.by;
+        Vector4::new(0.0, 0.0, phase.re, phase.im) * turn.kept
     }
 }
 
@@ -233,6 +259,10 @@ mod tests {
         LaidInterval { after_last, lasted: 0.0 }
     }
 
+    fn add(bead: &mut PulsatingBead, laid: LaidInterval, sample: &PulsationSample) {
+        let _ = bead.update(&bead.turn(laid), sample);
+    }
+
     #[test]
     fn the_fast_logarithm_is_one() {
         for k in -4000..4000 {
@@ -242,12 +272,23 @@ mod tests {
     }
 
     #[test]
+    fn half_the_period_turns_twice_as_far() {
+        let interval = LaidInterval { after_last: 0.37, lasted: 0.8 };
+        let turn = |period| PulsatingBead::new(period, 1.0, EXPONENT).turn(interval);
+        let (doubled, computed) = (turn(2.0).doubled(), turn(1.0));
+        assert!((doubled.by.as_ref() - computed.by.as_ref()).norm() < 1e-12);
+        assert!((doubled.kept - computed.kept).abs() < 1e-12);
+        assert!((doubled.cos_half_gauge - computed.cos_half_gauge).abs() < 1e-12);
+        assert_eq!(doubled.rad, computed.rad);
+    }
+
+    #[test]
     fn a_pulsation_of_its_period_is_predicted() {
         let period = 2.3;
         let truth = |at: f64| 3.7 + 0.02 * (TAU * at / period + 0.4).sin();
         let mut bead = PulsatingBead::new(period, 1.0, EXPONENT);
         for k in 0..600 {
-            let _ = bead.update(after(0.02), &sample(truth(0.02 * f64::from(k)), 0.0));
+            add(&mut bead, after(0.02), &sample(truth(0.02 * f64::from(k)), 0.0));
         }
         let last = 0.02 * 599.0;
         for ahead in [0.0, 0.5, 1.3] {
@@ -266,7 +307,7 @@ mod tests {
             let at = 0.02 * f64::from(k);
             let ln_speed = if at < 1.5 { 0.0 } else { -0.4 };
             let ln_width = 3.7 - exponent * ln_speed + 0.02 * (TAU * at / period).sin();
-            let _ = bead.update(after(0.02), &sample(ln_width, ln_speed));
+            add(&mut bead, after(0.02), &sample(ln_width, ln_speed));
         }
         assert!((bead.exponent() - exponent).abs() < 2e-3, "{bead:?}");
         assert!((bead.level() - 3.7).abs() < 1e-3);
@@ -277,8 +318,7 @@ mod tests {
         let mut bead = PulsatingBead::new(2.3, 1.0, EXPONENT);
         for k in 0..2000 {
             let [speed_noise, width_noise] = hash::normal_pair(hash::mix(&[5, k]));
-            let _ =
-                bead.update(after(0.1), &sample(3.7 + 0.001 * width_noise, 0.002 * speed_noise));
+            add(&mut bead, after(0.1), &sample(3.7 + 0.001 * width_noise, 0.002 * speed_noise));
         }
         assert!((bead.exponent() - EXPONENT.prior).abs() < 0.01, "{}", bead.exponent());
         assert!(bead.exponent_variance() > 0.8 * EXPONENT.prior_variance());
@@ -288,7 +328,7 @@ mod tests {
     fn a_steady_bead_has_no_pulsation() {
         let mut bead = PulsatingBead::new(f64::INFINITY, 1.0, EXPONENT);
         for k in 0..100 {
-            let _ = bead.update(after(0.1), &sample(3.7 + 0.01 * f64::from(k % 2), 0.0));
+            add(&mut bead, after(0.1), &sample(3.7 + 0.01 * f64::from(k % 2), 0.0));
         }
         assert_eq!(bead.mean(after(0.3)), 0.0);
     }
@@ -301,7 +341,7 @@ mod tests {
         let mut bead = PulsatingBead::new(period, 1.0, EXPONENT);
         for k in 0..600 {
             let seen = 3.7 + truth(0.02 * f64::from(k)) * half.sin() / half;
-            let _ = bead.update(LaidInterval { after_last: 0.02, lasted }, &sample(seen, 0.0));
+            add(&mut bead, LaidInterval { after_last: 0.02, lasted }, &sample(seen, 0.0));
         }
         let off = bead.mean(after(0.5)) - truth(0.02 * 599.0 + 0.5);
         assert!(off.abs() < 1e-4, "{off}");
@@ -312,7 +352,7 @@ mod tests {
         let mut bead = PulsatingBead::new(2.0, 1.0, EXPONENT);
         for k in 0..100 {
             let ln_speed = if k < 50 { 0.0 } else { -0.4 };
-            let _ = bead.update(after(0.1), &sample(3.7 - 0.3 * ln_speed, ln_speed));
+            add(&mut bead, after(0.1), &sample(3.7 - 0.3 * ln_speed, ln_speed));
         }
         let again = bead.begin_again();
         assert_eq!(again.exponent(), bead.exponent());

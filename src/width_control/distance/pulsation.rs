@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use super::exponent::Exponent;
-use super::pulsating_bead::{LaidInterval, PulsatingBead, PulsationSample};
+use super::pulsating_bead::{LaidInterval, PulsatingBead, PulsationSample, Turn};
 use super::pulse_counter::{PulseCounter, ScrewPulses};
 use super::width_model::{ExpectedBead, WiderExponent};
 use crate::core::Rpm;
@@ -13,9 +13,9 @@ use crate::core::Rpm;
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
 /// followed as drift.
 const PERIODS_S: (f64, f64) = (0.55, 10.0);
-/// Ratio of one period to the next. Derived: over 10 periods a harmonic that is off by half a step,
-/// 1 %, loses a tenth of a period.
-const PERIOD_RATIO: f64 = 1.02;
+/// Periods in an octave. Derived: over 10 periods a harmonic that is off by half a step, 1 %, loses a
+/// tenth of a period.
+const PERIODS_IN_OCTAVE: u8 = 35;
 /// Drifts of a flow without a pulsation over the stated one, as variances. Without the larger ones a
 /// restless flow would be taken for a pulsation.
 const DRIFT_RATIOS: [f64; 3] = [1.0, 10.0, 100.0];
@@ -39,6 +39,7 @@ const LONGEST_GAP_S: f64 = 3.0;
 /// Hypotheses of all periods, and of none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowPulsation {
+    /// From the longest period to the shortest, and those without a pulsation.
     hypotheses: Vec<Hypothesis>,
     /// Counts pulses, the unit of the period, where a screw makes them; none where it is seconds.
     counter: Option<PulseCounter>,
@@ -72,13 +73,15 @@ impl FlowPulsation {
     /// Before the first width. Without a screw the period is searched for.
     pub fn new(exponent: Exponent, screw: Option<ScrewPulses>) -> Self {
         let (shortest, longest) = PERIODS_S;
-        let searched = std::iter::successors(Some(shortest), |period| Some(period * PERIOD_RATIO))
+        let ratio = libm::exp2(1.0 / f64::from(PERIODS_IN_OCTAVE));
+        let searched = std::iter::successors(Some(shortest), |period| Some(period * ratio))
             .take_while(|period| *period < longest);
         let periods = if screw.is_some() { vec![1.0] } else { searched.collect() };
+        let pulsating =
+            periods.into_iter().rev().map(|period| PulsatingBead::new(period, 1.0, exponent));
         let steady = DRIFT_RATIOS.map(|ratio| PulsatingBead::new(f64::INFINITY, ratio, exponent));
-        let pulsating = periods.into_iter().map(|period| PulsatingBead::new(period, 1.0, exponent));
         Self {
-            hypotheses: steady.into_iter().chain(pulsating).map(Hypothesis::new).collect(),
+            hypotheses: pulsating.chain(steady).map(Hypothesis::new).collect(),
             counter: screw.map(|screw| PulseCounter::new(screw, 1.0 / longest..=1.0 / shortest)),
             last: None,
             seen_s: None,
@@ -119,18 +122,30 @@ impl FlowPulsation {
         let (laid, lasted) = (0.5 * (gauge.start + gauge.end), gauge.end - gauge.start);
         let new = LastWidth { laid_s: one.laid_s, laid, lasted };
         let last = self.last.unwrap_or(new);
-        if new.laid_s < last.laid_s {
+        if one.laid_s < last.laid_s {
             return;
         }
         self.last = Some(new);
-        let after_last = new.laid - last.laid;
-        self.observed += after_last;
-        let laid = LaidInterval { after_last, lasted: new.lasted };
-        let kept = 1.0 - ((new.laid_s - last.laid_s) / MEMORY_S).min(1.0);
-        for Hypothesis { bead, log_ratio, .. } in &mut self.hypotheses {
-            *log_ratio = *log_ratio * kept + bead.update(laid, one);
+        let interval = LaidInterval { after_last: laid - last.laid, lasted };
+        self.observed += interval.after_last;
+        let turns = self.turns(interval);
+        let kept = 1.0 - ((one.laid_s - last.laid_s) / MEMORY_S).min(1.0);
+        for (Hypothesis { bead, log_ratio, .. }, turn) in self.hypotheses.iter_mut().zip(&turns) {
+            *log_ratio = *log_ratio * kept + bead.update(turn, one);
         }
         self.weigh();
+    }
+
+    /// How the harmonic of every hypothesis turns to an interval. Only those of the longest octave are
+    /// computed: half the period is twice the angle.
+    fn turns(&self, to: LaidInterval) -> Vec<Turn> {
+        let mut turns: Vec<Turn> = Vec::with_capacity(self.hypotheses.len());
+        for one in &self.hypotheses {
+            let octave = turns.len().checked_sub(PERIODS_IN_OCTAVE.into());
+            let twice_as_long = octave.and_then(|at| turns.get(at)).filter(|_| one.bead.pulsates());
+            turns.push(twice_as_long.map_or_else(|| one.bead.turn(to), Turn::doubled));
+        }
+        turns
     }
 
     /// A time \[s\] in the unit of the period; none where no pulse is counted.
