@@ -52,6 +52,7 @@ impl Running {
             drift_per_root_m: 0.002,
             roughness: ROUGHNESS,
             cancels_pulsation: true,
+            screw_pulses: None,
         });
         let watch = BeadWatch::new(WatchSettings {
             offset: OFFSET,

@@ -33,6 +33,7 @@ impl Cell {
             gauge_length: self.gauge_length(calibration),
             setpoint_period: Span::from_secs(1.0 / run.robot.rate_hz),
             bead_noise: self.bead_noise,
+            screw_pulses: run.extruder.as_ref().and_then(|part| part.extruder.screw_pulses()),
         }
     }
 

@@ -18,7 +18,7 @@ pub use context::ExtruderRates;
 pub use part::{BeadStart, CellContext, ExtruderPart};
 pub use plant::{
     ExtruderPlant, GainRipple, InputLoad, LinearPlant, MeltPlant, PlantKind, PressurePlant,
-    ScrewPlant,
+    ScrewPlant, ScrewPulsation,
 };
 pub use strategy::{FeedforwardKeys, ModelSource, Strategy};
 
@@ -32,6 +32,7 @@ use crate::extruder::{
     CommandLimits, CommandQuantity, ExtruderSetup, ExtruderStrategy, FlowDemand, FlowFollows,
     ReadingFilters, RobotFollows,
 };
+use crate::width_control::distance::ScrewPulses;
 
 /// The extruder side of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +65,8 @@ pub struct ExtruderSettings {
     pub plan: Option<PathBuf>,
     /// How long a command holds at the extruder \[ms\].
     pub valid_ms: u64,
+    /// Pulses of the flow with every turn of the screw, if the file says so.
+    pub pulses_per_turn: Option<f64>,
 }
 
 /// How long a command holds at the extruder unless the file says so \[ms\].
@@ -124,6 +127,7 @@ impl ExtruderSettings {
             table.report("starts", "how the extruder starts and stops", expected);
         }
         let valid_ms = read_valid_ms(table, rates.map(|rates| rates.io_hz));
+        let pulses_per_turn = table.optional_number("pulses_per_turn", 0.01..=1000.0);
         Some(Self {
             drive: drive?,
             limits: limits?,
@@ -139,6 +143,7 @@ impl ExtruderSettings {
             starts,
             plan,
             valid_ms: valid_ms?,
+            pulses_per_turn,
         })
     }
 
@@ -159,6 +164,12 @@ impl ExtruderSettings {
     fn command_valid(&self) -> Span {
         let valid = Span::from_millis(i64::try_from(self.valid_ms).unwrap_or(i64::MAX));
         valid.max(Span::from_secs(shortest_s(self.rates.io_hz)))
+    }
+
+    /// Pulses of the flow by the screw. Its speed is valid as long as a command is: then it stands.
+    pub fn screw_pulses(&self) -> Option<ScrewPulses> {
+        let valid = self.command_valid();
+        self.pulses_per_turn.map(|per_turn| ScrewPulses { per_turn, valid })
     }
 
     /// The setup of the extruder side with the controller of a strategy. Start and stop times and

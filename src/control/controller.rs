@@ -138,8 +138,12 @@ impl Controller {
                 self.phase.end(Hold::Stopping);
                 command = Some(Command::Stop);
             }
+            Event::Extruder(report) => {
+                if let Some(speed) = report.screw_rpm {
+                    self.width.screw_reported(now, speed);
+                }
+            }
             Event::SetpointRefused { .. }
-            | Event::Extruder(_)
             | Event::ExtruderUp
             | Event::ExtruderDown { .. }
             | Event::ExtruderRefused { .. }

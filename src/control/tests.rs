@@ -41,6 +41,7 @@ pub fn setup() -> Setup {
             gauge_length: Mm::constant(12.7),
             setpoint_period: Span::from_millis(200),
             bead_noise: BeadNoise { roughness: None, length: Mm::constant(5.0) },
+            screw_pulses: None,
             width_range: WidthRange { min: Mm::constant(20.0), max: Mm::constant(60.0) },
         },
         bead_length: None,

@@ -150,7 +150,7 @@ impl ExtruderPort for SimExtruder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::extruder::LinearPlant;
+    use crate::cell::extruder::{LinearPlant, ScrewPulsation};
     use crate::numeric::lti::TransferFunction;
 
     fn extruder() -> SimExtruder {
@@ -167,6 +167,7 @@ mod tests {
             flow_noise_lag_s: 0.15,
             sensor_noise: None,
             screw_lag_s: None,
+            pulsation: ScrewPulsation::NONE,
         };
         SimExtruder::new(Box::new(LinearPlantSim::new(&plant, 1).unwrap()), delays)
     }

@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use super::distance::{DistanceTrace, FallbackReason, WidthReading};
 use super::pi::Saturation;
 use super::steps::StepsTrace;
-use crate::core::{Mm, MmPerS, Span, Stamp};
+use crate::core::{Mm, MmPerS, Rpm, Span, Stamp};
 
 /// Sets the robot's speed so that the bead has its width.
 pub trait WidthController: Debug + Send {
@@ -26,6 +26,9 @@ pub trait WidthController: Debug + Send {
 
     /// The robot reported while it lays bead.
     fn robot_reported(&mut self, _: &BeadReport) {}
+
+    /// The extruder reported the speed of its screw.
+    fn screw_reported(&mut self, _: Stamp, _: Rpm) {}
 
     /// Takes a measured width. Returns the tracking state where this controller sets the speed
     /// after it, or still does; `None` where it does not (yet).

@@ -19,6 +19,7 @@ mod flow_step;
 mod outlier_run;
 mod pulsating_bead;
 mod pulsation;
+mod pulse_counter;
 mod sample;
 mod width_model;
 
@@ -29,12 +30,14 @@ use serde::{Deserialize, Serialize};
 
 use super::bead_noise::{BeadRoughness, WidthNoise};
 use super::speed_history::SpeedHistory;
-use crate::core::{Mm, MmPerS, Span, Stamp};
+use crate::core::{Mm, MmPerS, Rpm, Span, Stamp};
 
 use exponent::Exponent;
 use flow_step::StepDetector;
 use outlier_run::OutlierRun;
-use pulsation::{FlowPulsation, PulsationSample};
+use pulsating_bead::PulsationSample;
+use pulsation::FlowPulsation;
+pub use pulse_counter::ScrewPulses;
 pub use sample::WidthReading;
 use sample::{GaugeInterval, MatchedWidth};
 use width_model::{BETWEEN_BEADS_SIGMA, ExpectedBead, WidthModel, WidthObservation};
@@ -61,6 +64,8 @@ pub struct DistanceSettings {
     pub roughness: BeadRoughness,
     /// Whether a pulsation of the flow is cancelled.
     pub cancels_pulsation: bool,
+    /// The screw that makes it, where its speed is reported; without one its period is searched for.
+    pub screw_pulses: Option<ScrewPulses>,
 }
 
 /// How a width was used.
@@ -133,7 +138,7 @@ impl DistanceController {
             noise: WidthNoise::new(settings.roughness, gauge.get()),
             steps: StepDetector::new(gauge.get()),
             outliers: OutlierRun::default(),
-            pulsation: FlowPulsation::new(exponent),
+            pulsation: FlowPulsation::new(exponent, settings.screw_pulses),
             unmatched_since_mm: None,
             is_unmatched: false,
         }
@@ -154,6 +159,11 @@ impl DistanceController {
     /// `speed / flow_ratio`.
     pub fn reported(&mut self, at: Stamp, path: Mm, speed: MmPerS, flow_ratio: f64) {
         self.speed_history.report(at.secs(), path.get(), speed.get(), flow_ratio);
+    }
+
+    /// The extruder reported the speed of its screw.
+    pub fn screw_reported(&mut self, at: Stamp, speed: Rpm) {
+        self.pulsation.screw_reported(at.secs(), speed);
     }
 
     /// A width of a frame that was captured with the nozzle at `nozzle_path`.

@@ -4,7 +4,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::time::Duration;
 
 use crossbeam_channel::{Receiver, unbounded};
-use truebead::cell::extruder::LinearPlant;
+use truebead::cell::extruder::{LinearPlant, ScrewPulsation};
 use truebead::core::Span;
 use truebead::drivers::extruder::DriveRange;
 use truebead::drivers::extruder::line::{ExtruderClient, ExtruderConfig, ExtruderLineEvent};
@@ -33,6 +33,7 @@ fn sim_on(listener: TcpListener) -> ExtruderSim {
         flow_noise_lag_s: 0.15,
         sensor_noise: Some(0.0),
         screw_lag_s: None,
+        pulsation: ScrewPulsation::NONE,
     };
     let plant = LinearPlantSim::new(&plant, 1).unwrap();
     let options = ExtruderOptions {

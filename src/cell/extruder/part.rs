@@ -114,7 +114,9 @@ fn check_plant(
     } else {
         "strategy"
     };
-    for (key, need) in [(key, needed), ("max_pressure_mpa", limited)] {
+    let counted = extruder.pulses_per_turn.map(|_| RequiredReading::Screw);
+    let needs = [(key, needed), ("max_pressure_mpa", limited), ("pulses_per_turn", counted)];
+    for (key, need) in needs {
         if let Some(need) = need.filter(|need| !kind.reports(*need)) {
             let (reading, plant) = match need {
                 RequiredReading::Pressure => ("a pressure", "kind = \"pressure\""),

@@ -131,6 +131,22 @@ pub struct LinearPlant {
     /// Time constant with which the screw follows a command in rpm, as its encoder reports \[s\];
     /// `None` for a screw that follows at once and has no encoder.
     pub screw_lag_s: Option<f64>,
+    /// Pulsation of the flow with the turns of the screw.
+    pub pulsation: ScrewPulsation,
+}
+
+/// A sinusoidal pulsation of a flow with the turns of the screw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScrewPulsation {
+    /// Amplitude as a fraction of the flow.
+    pub amplitude: f64,
+    /// Pulses in a turn.
+    pub per_turn: f64,
+}
+
+impl ScrewPulsation {
+    /// None.
+    pub const NONE: Self = Self { amplitude: 0.0, per_turn: 1.0 };
 }
 
 /// A screw in a simulated cell.
@@ -233,6 +249,13 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
     let lag = table.number_or("flow_noise_lag_s", 1e-3..=1e3, 0.15);
     let sensor = table.optional_number("flow_sensor_noise_mm3_per_s", 0.0..=1e12);
     let screw = table.optional_number("screw_lag_s", 0.0..=60.0);
+    let pulse_amplitude = table.number_or("flow_pulse_amplitude", 0.0..=0.9, 0.0);
+    let pulses_per_turn = table.number_or("flow_pulses_per_turn", 0.01..=1000.0, 1.0);
+    let pulsation = ScrewPulsation { amplitude: pulse_amplitude?, per_turn: pulses_per_turn? };
+    if screw.is_none() && pulsation.amplitude > 0.0 {
+        let expected = "screw_lag_s beside it: the flow pulsates with the turns of the screw";
+        table.report("flow_pulse_amplitude", pulsation.amplitude.to_string(), expected);
+    }
     Some(LinearPlant {
         transfer,
         unknown_input: unknown?,
@@ -241,6 +264,7 @@ fn read_linear(table: &Table<'_>, transfer: TransferFunction) -> Option<LinearPl
         flow_noise_lag_s: lag?,
         sensor_noise: sensor,
         screw_lag_s: screw,
+        pulsation,
     })
 }
 

@@ -10,6 +10,7 @@ use crate::extruder::start_stop::{BeadConditions, StartStopTiming};
 use crate::extruder::strategy::ConstantCommand;
 use crate::extruder::{ExtruderSetup, ExtruderStrategy};
 use crate::identify::start_stop::file;
+use crate::numeric::average::rms;
 use crate::run::runner::NoRecorder;
 
 const CELL: &str = include_str!("../../../cells/starts.toml");
@@ -100,4 +101,55 @@ fn starts_and_stops_that_are_known_lose_a_fifth_of_what_others_do() {
     });
     let [without, with] = sums;
     assert!(5.0 * (with.0 + with.1) < without.0 + without.1, "{sums:?}");
+}
+
+const EXTRUDER_CELL: &str = include_str!("../../../cells/extruder.toml");
+
+/// The newest period of a pulsation \[s\].
+#[derive(Debug, Default)]
+struct FoundPeriod(Option<f64>);
+
+impl Observer for FoundPeriod {
+    fn step(&mut self, _: Stamp, _: &Event, step: &Step) {
+        self.0 = step.trace.distance.map_or(self.0, |trace| trace.pulsation_s);
+    }
+
+    fn frame(&mut self, _: &FrameObservation<'_>) {}
+}
+
+/// Period that was found in a bead \[s\], and the RMS error of its width \[mm\]. The screw turns at
+/// 28 rpm and makes one pulse in a turn.
+fn with_pulsating_screw(extruder_keys: &str, control_keys: &str) -> (Option<f64>, f64) {
+    let pulsating = "gain_mm3_per_s = 2785.7143\nscrew_lag_s = 0.3\nflow_pulse_amplitude = 0.08";
+    let text = EXTRUDER_CELL
+        .replace("constant_rpm = 60.0", &format!("constant_rpm = 28.0\n{extruder_keys}"))
+        .replace("exponent = 0.25", &format!("exponent = 0.25\n{control_keys}"))
+        .replace("gain_mm3_per_s = 1300.0", pulsating)
+        .replace("path_mm = 2000.0", "path_mm = 3000.0");
+    let cell = Cell::parse(Path::new("extruder.toml"), &text, Purpose::Run).unwrap();
+    let run = cell.run.clone().unwrap();
+    let part = run.extruder.clone().unwrap();
+    let commanded = CommandedExtruder {
+        setup: part.extruder.setup(ExtruderStrategy::Constant(ConstantCommand(28.0))),
+        demand: part.demand,
+        plant: SimExtruder::of(part.plant.as_ref().unwrap(), 1, part.plant_nominal).unwrap(),
+        nominal_flow: part.plant_nominal,
+    };
+    let scale = Calibration::Scale { mm_per_px: 0.126_582, sigma: None };
+    let mut sim = SimCell::with_extruder(&cell, &run, scale, NoRecorder, Some(commanded)).unwrap();
+    let mut found = FoundPeriod::default();
+    assert!(sim.layer(Mm::ZERO, &mut found).complete);
+    let errors = (1500..2900).map(|mm| sim.bead().smooth_width_at(f64::from(mm)).unwrap() - 40.0);
+    (found.0, rms(errors))
+}
+
+#[test]
+fn the_pulsation_of_a_screw_is_cancelled_by_its_reported_speed() {
+    let (none, ignored) = with_pulsating_screw("", "pulsation = \"ignore\"");
+    let (searched, _) = with_pulsating_screw("", "");
+    let (counted, cancelled) = with_pulsating_screw("pulses_per_turn = 1.0", "");
+    let off = |period_s: Option<f64>| (period_s.unwrap() / (60.0 / 28.0) - 1.0).abs();
+    assert_eq!(none, None);
+    assert!(off(counted) < 1e-6 && off(searched) > 1e-4, "{counted:?} {searched:?}");
+    assert!(cancelled < 0.4 * ignored, "{cancelled} {ignored}");
 }

@@ -1,7 +1,10 @@
-//! A transfer function from command to flow, with an unknown input and a random flow.
+//! A transfer function from command to flow, with an unknown input, a random flow, and a flow that
+//! pulsates with the turns of the screw.
+
+use std::f64::consts::TAU;
 
 use super::plant::{STEP, SimPlant};
-use crate::cell::extruder::LinearPlant;
+use crate::cell::extruder::{LinearPlant, ScrewPulsation};
 use crate::core::{Mm3PerS, Rpm};
 use crate::extruder::ExtruderReport;
 use crate::numeric::lti::{Between, ModelError, Simulator};
@@ -22,6 +25,8 @@ pub struct LinearPlantSim {
     reports: u64,
     /// Speed of the screw \[unit of the command\].
     turning: f64,
+    /// Turns of a screw whose speed is commanded in rpm.
+    turns: f64,
     modelled: f64,
     noise: f64,
 }
@@ -31,8 +36,8 @@ impl LinearPlantSim {
     pub fn new(plant: &LinearPlant, seed: u64) -> Result<Self, ModelError> {
         let simulator = Simulator::new(&plant.transfer, STEP.secs(), Between::Held)?;
         let plant = plant.clone();
-        let (steps, reports, turning, modelled, noise) = (0, 0, 0.0, 0.0, 0.0);
-        Ok(Self { simulator, plant, seed, steps, reports, turning, modelled, noise })
+        let (steps, reports, turning, turns, modelled, noise) = (0, 0, 0.0, 0.0, 0.0, 0.0);
+        Ok(Self { simulator, plant, seed, steps, reports, turning, turns, modelled, noise })
     }
 
     /// Speed of the screw after a step with a command.
@@ -55,6 +60,7 @@ impl LinearPlantSim {
 impl SimPlant for LinearPlantSim {
     fn advance(&mut self, command: Option<f64>) {
         self.turning = self.screw_after(command.unwrap_or(0.0));
+        self.turns += self.turning / 60.0 * STEP.secs();
         let unknown = if command.is_some() { self.unknown() } else { 0.0 };
         let input = self.turning + unknown;
         self.modelled = self.simulator.step(input);
@@ -68,7 +74,9 @@ impl SimPlant for LinearPlantSim {
     }
 
     fn flow(&self) -> Mm3PerS {
-        Mm3PerS::new((self.modelled + self.noise).max(0.0)).unwrap_or_default()
+        let ScrewPulsation { amplitude, per_turn } = self.plant.pulsation;
+        let pulse = 1.0 + amplitude * libm::sin(TAU * per_turn * self.turns);
+        Mm3PerS::new((self.modelled + self.noise).max(0.0) * pulse).unwrap_or_default()
     }
 
     fn sense(&mut self, report: &mut ExtruderReport) {

@@ -1,5 +1,8 @@
 //! Control by distance on a simulated bead.
 
+use std::f64::consts::TAU;
+use std::ops::Range;
+
 use super::*;
 use crate::sim::hash;
 
@@ -32,6 +35,7 @@ fn settings() -> DistanceSettings {
         drift_per_root_m: 0.002,
         roughness: BeadRoughness { ratio: 0.0025, length_mm: 5.0 },
         cancels_pulsation: true,
+        screw_pulses: None,
     }
 }
 
@@ -254,6 +258,73 @@ fn noise_of_the_reported_speed_does_not_change_the_exponent() {
             let exact = WidthReading { width: Mm::constant(38.61), sigma: Mm::constant(0.002) };
             let trace = controller.measured(Mm::constant(path), exact);
             assert!((trace.exponent - 0.25).abs() < 0.01, "{k}: {trace:?}");
+        }
+    }
+}
+
+/// RMS error, within a time \[s\], of a bead whose flow pulsates with every turn of a screw that
+/// becomes faster by 20 % from 25 to 30 s. Its speed is reported 60 ms late, in whole turns a minute.
+fn rms_with_screw(per_turn: Option<f64>, cancels_pulsation: bool, within_s: Range<f64>) -> f64 {
+    let valid = Span::from_millis(300);
+    let screw_pulses = per_turn.map(|per_turn| ScrewPulses { per_turn, valid });
+    let mut line = Line::new(DistanceSettings { cancels_pulsation, screw_pulses, ..settings() });
+    let speed_ratio = |at: f64| 1.0 + 0.2 * ((at - 25.0) / 5.0).clamp(0.0, 1.0);
+    let (mut turns, mut squares, mut count) = (0.0, 0.0, 0.0);
+    while line.now_s < within_s.end {
+        let reported = (40.3 * speed_ratio(line.now_s - 0.06)).round();
+        line.controller.screw_reported(Stamp::from_secs(line.now_s), Rpm::constant(reported));
+        turns += 40.3 / 60.0 * speed_ratio(line.now_s) * STEP_S;
+        let flow = speed_ratio(line.now_s).powf(0.25) * (1.0 + 0.02 * (TAU * turns).sin());
+        let _ = line.step(0.25, |_| flow, 0.1);
+        if within_s.contains(&line.now_s) {
+            (squares, count) = (squares + line.error().powi(2), count + 1.0);
+        }
+    }
+    f64::sqrt(squares / count)
+}
+
+#[test]
+fn a_pulsation_is_cancelled_while_the_screw_becomes_faster() {
+    let rms = |per_turn, within_s| rms_with_screw(per_turn, true, within_s);
+    let (counted, searched) = (rms(Some(1.0), 12.0..50.0), rms(None, 12.0..50.0));
+    assert!(counted < searched, "{counted} {searched}");
+    // Bead that was laid while its flow changed has been seen by then.
+    let (counted, searched) = (rms(Some(1.0), 31.0..38.0), rms(None, 31.0..38.0));
+    assert!(counted < 0.3 * searched, "{counted} {searched}");
+}
+
+#[test]
+fn a_wrong_number_of_pulses_does_no_harm() {
+    let ignored = rms_with_screw(None, false, 12.0..50.0);
+    for per_turn in [0.5, 0.9, 0.95, 1.05, 1.1, 1.37, 2.0, 30.0] {
+        let wrong = rms_with_screw(Some(per_turn), true, 12.0..50.0);
+        assert!(wrong < 1.05 * ignored, "{per_turn}: {wrong} {ignored}");
+    }
+}
+
+#[test]
+fn without_the_speed_of_the_screw_no_pulsation_is_cancelled() {
+    let screw = ScrewPulses { per_turn: 1.0, valid: Span::from_millis(300) };
+    let mut line = Line::new(DistanceSettings { screw_pulses: Some(screw), ..settings() });
+    let mut found = Vec::new();
+    while line.now_s < 40.0 {
+        let now_s = line.now_s;
+        // From 20 s on nothing is reported; from 30 s on the screw is reported to stand.
+        if !(20.0..30.0).contains(&now_s) {
+            let rpm = Rpm::constant(if now_s < 30.0 { 30.0 } else { 0.0 });
+            line.controller.screw_reported(Stamp::from_secs(now_s), rpm);
+        }
+        let flow = 1.0 + 0.02 * (TAU * 0.5 * now_s).sin();
+        let trace = line.step(0.25, |_| flow, 0.1);
+        found.extend(trace.map(|trace| (now_s, trace.pulsation_s)));
+    }
+    for (at, period) in found {
+        if (12.0..20.0).contains(&at) {
+            assert!(period.is_some_and(|period| (period - 2.0).abs() < 1e-9), "{at}: {period:?}");
+        }
+        // The camera sees bead that is 1.1 s old.
+        if at > 22.0 {
+            assert_eq!(period, None, "{at}");
         }
     }
 }

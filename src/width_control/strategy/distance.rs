@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::kind::{CellParameters, Registration, WidthControlSettings, WidthStrategy};
 use super::pi::{PiControl, cautious_gains};
-use crate::core::{Mm, MmPerS, Stamp};
+use crate::core::{Mm, MmPerS, Rpm, Stamp};
 use crate::document::Table;
 use crate::width_control::controller::{
     BeadReport, BoxedController, Outlook, SpeedRequest, Tracking, WidthController, WidthSample,
@@ -59,6 +59,7 @@ impl WidthStrategy for DistanceStrategy {
             drift_per_root_m: self.drift_per_root_m,
             roughness: cell.bead_noise.roughness_at(target),
             cancels_pulsation: self.cancels_pulsation,
+            screw_pulses: cell.screw_pulses,
         };
         let gains = control.gains.unwrap_or_else(|| cautious_gains(cell, target, self.exponent));
         Box::new(DistanceControl {
@@ -129,6 +130,10 @@ impl WidthController for DistanceControl {
     fn robot_reported(&mut self, report: &BeadReport) {
         self.by_distance.reported(report.at, report.path, report.speed, report.flow_ratio);
         self.look_for_fallback();
+    }
+
+    fn screw_reported(&mut self, at: Stamp, speed: Rpm) {
+        self.by_distance.screw_reported(at, speed);
     }
 
     /// Updates the model with every width, also while PI control sets the speed. Tracking

@@ -9,6 +9,7 @@ use crate::core::{Mm, MmPerS, Span, WidthRange};
 use crate::document::Table;
 use crate::width_control::bead_noise::BeadRoughness;
 use crate::width_control::controller::BoxedController;
+use crate::width_control::distance::ScrewPulses;
 use crate::width_control::limiter::SpeedLimits;
 use crate::width_control::pi::PiGains;
 use crate::width_control::target::WidthTarget;
@@ -96,6 +97,8 @@ pub struct CellParameters {
     pub setpoint_period: Span,
     /// How rough the bead is.
     pub bead_noise: BeadNoise,
+    /// Pulses of the flow by a screw whose speed is reported, where the cell says how many.
+    pub screw_pulses: Option<ScrewPulses>,
 }
 
 /// Roughness of a bead's width along it.
