@@ -5,8 +5,11 @@ use std::f64::consts::PI;
 
 /// Smallest part of the correlation length over which two widths differ at all.
 const MIN_SPACING_RATIO: f64 = 0.01;
-/// Path over which innovations are averaged \[mm\].
+/// Path over which innovations are averaged \[mm\] ...
 const AVERAGED_MM: f64 = 300.0;
+/// ... and its least number of correlation lengths. Derived: of one gauge alone the estimate is half of
+/// the truth in the median; a mean over 50 lengths has a fifth of it as its standard deviation.
+const AVERAGED_LENGTHS: f64 = 50.0;
 /// Innovations are clipped at this many standard deviations. Derived: 7² / 50 = 1, so that an
 /// outlier in fifty widths makes the noise at most twice as large. The mean square of a consistent filter stays 1.
 const MAX_SIGMAS: f64 = 7.0;
@@ -30,6 +33,8 @@ pub struct WidthNoise {
     density_mm: f64,
     /// Distance over which widths are independent \[mm\].
     reach_mm: f64,
+    /// Path over which innovations are averaged \[mm\].
+    averaged_mm: f64,
     /// Moving average of half the squared difference of two normalised innovations that are
     /// independent.
     nis: f64,
@@ -50,6 +55,7 @@ impl WidthNoise {
         Self {
             density_mm: roughness.ratio * roughness.ratio * reach,
             reach_mm: gauge_mm + reach,
+            averaged_mm: AVERAGED_MM.max(AVERAGED_LENGTHS * roughness.length_mm),
             nis: 1.0,
             last: VecDeque::new(),
         }
@@ -86,7 +92,7 @@ impl WidthNoise {
         let Some(before) = independent else { return };
         self.last.push_front(before);
         let squared = 0.5 * (normalised - before.normalised).powi(2);
-        let weight = -libm::expm1(-spacing / AVERAGED_MM);
+        let weight = -libm::expm1(-spacing / self.averaged_mm);
         self.nis += weight * (squared - self.nis);
     }
 

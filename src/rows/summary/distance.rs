@@ -74,12 +74,12 @@ impl DistanceTally {
     /// The summary; `None` where no width has reached a distance controller.
     pub fn finish(&self) -> Option<DistanceSummary> {
         let last = self.last?;
-        let [taken, outliers, changes, not_paired] = self.counts;
+        let [taken, outliers, changes, not_matched] = self.counts;
         Some(DistanceSummary {
             samples_used: taken,
             outliers,
             changes,
-            without_speed_history: not_paired,
+            without_speed_history: not_matched,
             level_mm: last.level_mm.get(),
             level_sigma_mm: last.level_sigma_mm.get(),
             exponent: last.exponent,
