@@ -25,7 +25,8 @@ pub fn wrong_offset_in_words(wrong: WrongOffset) -> String {
     let WrongOffset { found_mm, stated_mm } = wrong;
     format!(
         "the widths follow the speed as if the camera looked about {:.0} mm behind the nozzle, \
-         [camera] offset_mm is {:.1}; measure it with truebead camera offset",
+         [camera] offset_mm is {:.1}; measure it with truebead camera offset, with --latency where frames carry no time of \
+         capture",
         found_mm.get(),
         stated_mm.get()
     )

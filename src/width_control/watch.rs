@@ -36,7 +36,8 @@ pub struct WatchSettings {
 pub struct Findings {
     /// The change of the speed that has had no effect.
     pub no_response: Option<NoResponse>,
-    /// The offset that fits the widths better than the stated one, from the width on that shows it.
+    /// The offset that fits the widths better than the stated one, from the width on that shows it to
+    /// the end of the run.
     pub wrong_offset: Option<WrongOffset>,
 }
 

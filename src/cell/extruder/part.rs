@@ -122,10 +122,13 @@ fn check_plant(
                 RequiredReading::Pressure => ("a pressure", "kind = \"pressure\""),
                 RequiredReading::Filled => ("a filled length", "kind = \"screw\""),
                 RequiredReading::Flow => ("a flow", "flow_sensor_noise_mm3_per_s"),
-                RequiredReading::Screw => ("the screw's speed", "screw_lag_s"),
+                RequiredReading::Screw => (
+                    "the screw's speed",
+                    "kind = \"pressure\", or \"direct\" or \"linear\" and screw_lag_s",
+                ),
             };
             let found = format!("{reading} to go by, which [extruder_plant] never reports");
-            table.report(key, found, format!("one with {plant}, or none at all"));
+            table.report(key, found, format!("a plant with {plant}, or no [extruder_plant]"));
         }
     }
 }

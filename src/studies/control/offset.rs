@@ -11,6 +11,7 @@ use crate::run::runner::NoRecorder;
 use crate::sim::cell::{FrameObservation, Observer, SimCell};
 use crate::studies::barjuei2022::scale;
 use crate::studies::error::ReproduceError;
+use crate::width_control::watch::WrongOffset;
 
 /// Length of a bead \[mm\]. Derived: it holds the start, a step of the flow, and the offset behind both.
 const LENGTH_MM: f64 = 3000.0;
@@ -31,14 +32,17 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
         .collect::<Result<_, ReproduceError>>()?;
     let shown: Vec<&Warned> = all.iter().filter(|one| one.passed_mm().is_some()).collect();
     let late = to_f64(shown.iter().filter(|one| one.is_late()).count());
+    let wrong_side = to_f64(all.iter().filter(|one| one.names_wrong_side()).count());
     let after: Vec<f64> = shown.iter().map(|one| one.after_mm()).collect();
     let row = |quantity, value, required| {
         CaseRow::new(cell, "offset 20 % wrong", quantity, shown.len(), value, required)
     };
     let fraction = Quantity::ratio("fraction not noticed in time");
-    let noticed = Quantity::mm("noticed after the second change, median");
+    let noticed = Quantity::mm("noticed after the first change, median");
+    let other_side = Quantity::ratio("fraction that names the wrong side");
     Ok(vec![
         row(fraction, late / to_f64(shown.len()), 0.05),
+        row(other_side, wrong_side / to_f64(all.len()), 0.01),
         row(noticed, quantile(&after, 0.5), f64::INFINITY),
     ])
 }
@@ -67,6 +71,8 @@ struct Warned {
     /// Where ln v had changed by [`CHANGE`], apart from changes that are seen together.
     changes_mm: Vec<f64>,
     noticed_mm: Option<f64>,
+    /// The first offset that was found, and the stated one.
+    found: Option<WrongOffset>,
 }
 
 impl Warned {
@@ -84,6 +90,7 @@ impl Warned {
             ln_speed: plan.run.robot.start_speed.get().ln(),
             changes_mm: Vec::new(),
             noticed_mm: None,
+            found: None,
         };
         let factor = plan.assumed_offset;
         let mut sim = SimCell::mismatched(&cell, &plan.run, factor, scale(), NoRecorder)?;
@@ -101,10 +108,17 @@ impl Warned {
         self.passed_mm() < self.noticed_mm.or(Some(f64::INFINITY))
     }
 
-    /// Path from the second change until it was noticed \[mm\]; infinite if it never was.
+    /// Whether the offset that was found lies on the wrong side of the stated one.
+    fn names_wrong_side(&self) -> bool {
+        self.found.is_some_and(|WrongOffset { found_mm, stated_mm }| {
+            (found_mm > stated_mm) != (self.offset_mm > stated_mm.get())
+        })
+    }
+
+    /// Path from the first change until it was noticed \[mm\]; infinite if it never was.
     fn after_mm(&self) -> f64 {
-        let last = self.changes_mm.get(CHANGES - 1).copied().unwrap_or_default();
-        self.noticed_mm.map_or(f64::INFINITY, |warned| warned - last)
+        let first = self.changes_mm.first().copied().unwrap_or_default();
+        self.noticed_mm.map_or(f64::INFINITY, |noticed| noticed - first)
     }
 }
 
@@ -127,8 +141,9 @@ impl Observer for Warned {
                 }
             }
         }
-        if step.trace.wrong_offset.is_some() {
+        if let Some(found) = step.trace.wrong_offset {
             self.noticed_mm.get_or_insert(self.path_mm);
+            self.found.get_or_insert(found);
         }
     }
 

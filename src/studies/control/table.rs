@@ -22,7 +22,7 @@ pub struct CaseRow {
     /// Half of its confidence interval of 95 %, where it is a mean over the beads.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
-    /// Largest value that is required; infinite where none is.
+    /// Largest value that is required; infinite, `null` in the file, where none is.
     pub required: f64,
 }
 

@@ -57,7 +57,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// Of a harmonic with twice the frequency, in less time than from the interval.
+    /// Of a harmonic with twice the frequency: faster than computing it from the interval.
     pub fn doubled(&self) -> Self {
         Self {
             by: self.by * self.by,
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fast_logarithm_is_one() {
+    fn the_fast_logarithm_is_a_logarithm() {
         for k in -4000..4000 {
             let x = 2.0_f64.powf(0.01 * f64::from(k));
             assert!((ln(x) - libm::log(x)).abs() < 3e-8, "{x}");

@@ -105,7 +105,7 @@ impl FlowPulsation {
         }
     }
 
-    /// A width has come that may not be used. After a gap, and where no pulse is counted, phases are
+    /// A width has come, whether it will be used or not. After a gap, and where no pulse is counted, phases are
     /// not known any more.
     pub fn see(&mut self, laid_s: f64) {
         let is_after_gap = self.seen_s.is_some_and(|seen| laid_s - seen > LONGEST_GAP_S);

@@ -5,8 +5,8 @@
 //! control answers them; but all that goes on, and is predicted from the widths before. So each offset
 //! that is tried has an autoregression, and the likelihood ratio of the prediction errors says which
 //! one is right: a sequential test (Page 1954). A jump of the flow may look like the effect of another
-//! offset. No jump gives enough for a warning; that several do, and for the same offset, has no other
-//! cause.
+//! offset. One jump does not give enough for a warning; that several do, and for the same offset, has no
+//! other cause.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,8 +21,8 @@ pub const LARGEST_ERROR: f64 = 0.35;
 /// The errors that are tried. Derived: smaller ones than 15 % are within one and a half of these
 /// standard deviations.
 const ERRORS: [f64; 8] = [-LARGEST_ERROR, -0.25, -0.2, -0.15, 0.15, 0.2, 0.25, LARGEST_ERROR];
-/// Path from one width that is used to the next, as a fraction of the offset. Derived: half of an
-/// error of 20 %.
+/// Path from one width that is used to the next, as a fraction of the offset. Derived: a little
+/// less than half of an error of 20 %.
 const SPACING_RATIO: f64 = 0.09;
 /// How many times more or less it may be. Derived: more than the square root of two, so that
 /// two spacings in a row fit.
@@ -30,9 +30,14 @@ const SPACING_RANGE: f64 = 1.5;
 /// Difference of ln v between the places where the camera may look from which on they are compared.
 /// Derived: half of a change after two of which an error must be noticed.
 const MIN_SPEED_CHANGE: f64 = 0.05;
+/// Jump of the width that this must make, in standard deviations of its prediction. Derived: what is
+/// smaller is hidden by the roughness of the bead.
+const MIN_JUMP_SIGMAS: f64 = 3.0;
 /// Squared prediction errors are clipped at this many variances. Derived: 4.5 standard deviations; what
 /// is farther off is no noise, and says no more.
 const MAX_SQUARE: f64 = 20.0;
+/// Log likelihood ratio of a width at which a jump begins to be seen. Derived: less is noise.
+const JUMP_FROM: f64 = 1.0;
 /// Smallest log likelihood ratio by the widths that see one jump that counts for another offset.
 /// Derived: waves that control answers give less, and would add up over many.
 const MIN_OF_A_JUMP: f64 = 4.0;
@@ -63,8 +68,6 @@ pub struct OffsetTest {
     stated: Autoregression,
     trials: [Trial; ERRORS.len()],
     spacing: Spacing,
-    /// Where the widths began that may see the same jump \[mm\].
-    jump_from_mm: Option<f64>,
     found: Option<WrongOffset>,
 }
 
@@ -72,10 +75,14 @@ pub struct OffsetTest {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Trial {
     bead: Autoregression,
-    /// Log likelihood ratio to the stated offset by the widths before ...
+    /// Where the widths began that see the newest jump \[mm\].
+    jump_from_mm: Option<f64>,
+    /// Log likelihood ratio to the stated offset by the jumps before ...
     before: f64,
-    /// ... and by those that may see the same jump.
+    /// ... and by that one.
     jump: f64,
+    /// Log likelihood ratio by all widths, whatever a jump may count for.
+    fit: f64,
 }
 
 /// Leaves out widths that come close together: every n-th is used.
@@ -107,9 +114,9 @@ impl OffsetTest {
             gauge_mm,
             exponent,
             stated: bead,
-            trials: [Trial { bead, before: 0.0, jump: 0.0 }; ERRORS.len()],
+            trials: [Trial { bead, jump_from_mm: None, before: 0.0, jump: 0.0, fit: 0.0 };
+                ERRORS.len()],
             spacing,
-            jump_from_mm: None,
             found: None,
         }
     }
@@ -119,10 +126,9 @@ impl OffsetTest {
         self.stated.begin();
         for trial in &mut self.trials {
             trial.bead.begin();
-            trial.end_jump();
+            trial.end_jump(f64::INFINITY);
         }
         self.spacing.last_mm = None;
-        self.jump_from_mm = None;
     }
 
     /// A width of the bead about a position \[mm\], by the stated offset. Returns the offset that fits
@@ -143,40 +149,36 @@ impl OffsetTest {
 
     fn ln_speeds(&self, speeds: &SpeedHistory, position_mm: f64) -> Option<SeenSpeeds> {
         let half = 0.5 * self.gauge_mm;
-        let at = |error: f64| {
-            let laid = position_mm - error * self.offset.get();
-            Some(speeds.mean_near(laid - half, laid + half)?.mean)
-        };
         let mut tried = [0.0; ERRORS.len()];
         for (ln_speed, error) in tried.iter_mut().zip(ERRORS) {
-            *ln_speed = at(error)?;
+            let laid = position_mm - error * self.offset.get();
+            *ln_speed = speeds.mean_near(laid - half, laid + half)?.mean;
         }
-        Some(SeenSpeeds { stated: at(0.0)?, tried })
+        let stated = speeds.mean_over(position_mm - half, position_mm + half)?.mean;
+        Some(SeenSpeeds { stated, tried })
     }
 
     fn add(&mut self, seen: &SeenSpeeds, position_mm: f64, ln_width: f64) {
-        let is_compared = seen.range() > MIN_SPEED_CHANGE && self.stated.is_begun();
-        if is_compared
-            && self.jump_from_mm.is_none_or(|from| position_mm - from > self.jump_length_mm())
-        {
-            self.jump_from_mm = Some(position_mm);
-            self.trials.iter_mut().for_each(Trial::end_jump);
-        }
+        let jump_length_mm = self.jump_length_mm();
         let flow = |ln_speed: f64| ln_width + self.exponent * ln_speed;
         let stated = self.stated.predict(flow(seen.stated));
+        let jump = self.exponent * seen.range();
+        let is_seen = jump * jump > MIN_JUMP_SIGMAS * MIN_JUMP_SIGMAS * stated.variance;
+        let is_compared = is_seen && seen.range() > MIN_SPEED_CHANGE && self.stated.is_begun();
         for (trial, ln_speed) in self.trials.iter_mut().zip(seen.tried) {
             let error = trial.bead.predict(flow(ln_speed));
+            trial.end_jump(position_mm - jump_length_mm);
             if is_compared {
-                trial.compare(error, stated);
+                trial.compare(error, stated, position_mm);
             }
         }
         self.judge();
     }
 
     fn judge(&mut self) {
-        let ratios = self.trials.iter().map(Trial::log_ratio).zip(ERRORS);
-        let best = ratios.max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, error)) = best.filter(|(ratio, _)| *ratio >= WRONG_FROM) {
+        let trials = self.trials.iter().zip(ERRORS);
+        let best = trials.max_by(|a, b| a.0.fit.total_cmp(&b.0.fit));
+        if let Some((_, error)) = best.filter(|(trial, _)| trial.log_ratio() >= WRONG_FROM) {
             let found_mm = Mm::new((1.0 + error) * self.offset.get()).unwrap_or_default();
             self.found.get_or_insert(WrongOffset { found_mm, stated_mm: self.offset });
         }
@@ -200,10 +202,17 @@ impl SeenSpeeds {
 impl Trial {
     /// Adds the log likelihood ratio of two prediction errors. Both count over the larger variance, so
     /// that neither gains by promising less.
-    fn compare(&mut self, here: PredictionError, stated: PredictionError) {
+    fn compare(&mut self, here: PredictionError, stated: PredictionError, position_mm: f64) {
         let variance = here.variance.max(stated.variance);
         let clipped = |error: PredictionError| (error.square / variance).min(MAX_SQUARE);
-        self.jump += 0.5 * (clipped(stated) - clipped(here));
+        let ratio = 0.5 * (clipped(stated) - clipped(here));
+        self.fit = (self.fit + ratio).max(MOST_AGAINST);
+        if self.jump_from_mm.is_none() && ratio.abs() >= JUMP_FROM {
+            self.jump_from_mm = Some(position_mm);
+        }
+        if self.jump_from_mm.is_some() {
+            self.jump += ratio;
+        }
     }
 
     /// Log likelihood ratio to the stated offset.
@@ -212,9 +221,12 @@ impl Trial {
         self.before + if says_little { 0.0 } else { self.jump.min(MAX_OF_A_JUMP) }
     }
 
-    fn end_jump(&mut self) {
-        self.before = self.log_ratio().max(MOST_AGAINST);
-        self.jump = 0.0;
+    /// Ends a jump that has been seen since before a position \[mm\].
+    fn end_jump(&mut self, before_mm: f64) {
+        if self.jump_from_mm.take_if(|from| *from < before_mm).is_some() {
+            self.before = self.log_ratio().max(MOST_AGAINST);
+            self.jump = 0.0;
+        }
     }
 }
 
@@ -225,6 +237,9 @@ impl Spacing {
 
     /// Whether the width at this position is one of those that are used.
     fn uses(&mut self, position_mm: f64) -> bool {
+        if self.last_mm.is_some_and(|last| position_mm <= last) {
+            return false;
+        }
         self.left_out += 1;
         if self.left_out < self.every {
             return false;
@@ -317,9 +332,12 @@ mod tests {
             let wave = |place: f64| 0.02 * (std::f64::consts::TAU * place / length).sin();
             assert_eq!(found_error(0.0, wave), None, "{length}");
         }
-        for jump_mm in [470.0, 480.0, 490.0, 500.0, 509.0, 518.0, 530.0] {
-            let jump = |place: f64| if place > jump_mm { -0.05 } else { 0.0 };
-            assert_eq!(found_error(0.0, jump), None, "{jump_mm}");
+        for step in 0..=60 {
+            let jump_mm = 440.0 + 2.0 * f64::from(step);
+            for ratio in [-0.05, 0.05] {
+                let jump = |place: f64| if place > jump_mm { ratio } else { 0.0 };
+                assert_eq!(found_error(0.0, jump), None, "{ratio} at {jump_mm}");
+            }
         }
     }
 }
