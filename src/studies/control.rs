@@ -3,6 +3,7 @@
 //! seeds in four cells, and judged by the bead itself, not by what was measured.
 
 pub mod bead_figures;
+mod laid_length;
 mod latency;
 pub mod live;
 mod mismatch;

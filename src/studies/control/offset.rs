@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::laid_length::LaidLength;
 use super::plant::{Control, Draw, LoopCell, Plan};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::control::{Command, Event, Step};
@@ -64,8 +65,7 @@ struct Warned {
     offset_mm: f64,
     /// Path beyond the offset within which a change is seen.
     seen_within_mm: f64,
-    start_mm: Option<f64>,
-    path_mm: f64,
+    laid: LaidLength,
     /// The commanded ln v at the last change.
     ln_speed: f64,
     /// Where ln v had changed by [`CHANGE`], apart from changes that are seen together.
@@ -85,8 +85,7 @@ impl Warned {
         let mut warned = Self {
             offset_mm,
             seen_within_mm,
-            start_mm: None,
-            path_mm: 0.0,
+            laid: LaidLength::default(),
             ln_speed: plan.run.robot.start_speed.get().ln(),
             changes_mm: Vec::new(),
             noticed_mm: None,
@@ -124,25 +123,22 @@ impl Warned {
 
 impl Observer for Warned {
     fn step(&mut self, _: Stamp, event: &Event, step: &Step) {
-        if let Event::Robot(state) = event
-            && state.mode.lays_bead()
-        {
-            let start = *self.start_mm.get_or_insert(state.path_mm.get());
-            self.path_mm = state.path_mm.get() - start;
-        }
+        self.laid.follow(event);
         if let Some(Command::Speed(speed)) = step.command {
             let ln_speed = speed.get().ln();
-            let apart =
-                self.changes_mm.last().is_none_or(|last| self.path_mm - last > self.seen_within_mm);
+            let apart = self
+                .changes_mm
+                .last()
+                .is_none_or(|last| self.laid.path_mm - last > self.seen_within_mm);
             if (ln_speed - self.ln_speed).abs() >= CHANGE {
                 self.ln_speed = ln_speed;
                 if apart {
-                    self.changes_mm.push(self.path_mm);
+                    self.changes_mm.push(self.laid.path_mm);
                 }
             }
         }
         if let Some(found) = step.trace.wrong_offset {
-            self.noticed_mm.get_or_insert(self.path_mm);
+            self.noticed_mm.get_or_insert(self.laid.path_mm);
             self.found.get_or_insert(found);
         }
     }

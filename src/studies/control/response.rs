@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::laid_length::LaidLength;
 use super::plant::{Control, Draw, LoopCell, Plan, TARGET_MM};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::control::{Command, Event, Hold, State, Step};
@@ -116,8 +117,7 @@ fn disturbed(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, Reprod
 /// What was noticed on a bead. Paths count from its beginning.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Noticed {
-    start_mm: Option<f64>,
-    path_mm: f64,
+    laid: LaidLength,
     /// From where on the camera sees another bead; infinite where it never does.
     fault_from_mm: f64,
     /// The last commanded ln v, and the one at the fault.
@@ -154,28 +154,23 @@ impl Noticed {
 
 impl Observer for Noticed {
     fn step(&mut self, _: Stamp, event: &Event, step: &Step) {
-        if let Event::Robot(state) = event
-            && state.mode.lays_bead()
-        {
-            let start = *self.start_mm.get_or_insert(state.path_mm.get());
-            self.path_mm = state.path_mm.get() - start;
-        }
+        self.laid.follow(event);
         if let Some(Command::Speed(speed)) = step.command {
             self.ln_speed = Some(speed.get().ln());
         }
-        if self.path_mm >= self.fault_from_mm
+        if self.laid.path_mm >= self.fault_from_mm
             && let Some(ln_speed) = self.ln_speed
         {
             let before = *self.ln_speed_at_fault.get_or_insert(ln_speed);
             if (ln_speed - before).abs() >= COMMANDED {
-                self.commanded_mm.get_or_insert(self.path_mm);
+                self.commanded_mm.get_or_insert(self.laid.path_mm);
             }
         }
         if matches!(step.state, State::Holding(Hold::NoResponse(_))) {
-            self.held_mm.get_or_insert(self.path_mm);
+            self.held_mm.get_or_insert(self.laid.path_mm);
         }
         if step.trace.wrong_offset.is_some() {
-            self.warned_mm.get_or_insert(self.path_mm);
+            self.warned_mm.get_or_insert(self.laid.path_mm);
         }
     }
 

@@ -5,7 +5,7 @@
 //! control answers them; but all that goes on, and is predicted from the widths before. So each offset
 //! that is tried has an autoregression, and the likelihood ratio of the prediction errors says which
 //! one is right: a sequential test (Page 1954). A jump of the flow may look like the effect of another
-//! offset. One jump does not give enough for a warning; that several do, and for the same offset, has no
+//! offset. One jump gives too little for a warning, as a rule; that several do, for one offset, has no
 //! other cause.
 
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ const MIN_OF_A_JUMP: f64 = 4.0;
 /// The largest one. Derived: odds of one to eight thousand, after which a second jump is wanted.
 const MAX_OF_A_JUMP: f64 = 9.0;
 /// Log likelihood ratio from which on the stated offset is wrong. Derived: the largest and the smallest
-/// of a jump, so that no single jump gives it.
+/// of a jump, so that a jump alone does not give it, unless it is seen twice.
 const WRONG_FROM: f64 = MAX_OF_A_JUMP + MIN_OF_A_JUMP;
 /// Largest log likelihood ratio against an offset. Derived: a camera that is moved after it was right
 /// for long is noticed after a few more changes of the speed.
