@@ -33,6 +33,7 @@ pub mod link;
 pub mod live;
 pub mod numeric;
 pub mod plan;
+pub mod rehearsal;
 pub mod report;
 pub mod rows;
 pub mod run;

@@ -14,9 +14,9 @@
 //! stop, recording finished, threads joined.
 
 pub mod capture;
-mod control;
+pub mod control;
 pub mod journal;
-mod latency;
+pub mod latency;
 mod mailbox;
 pub mod run_logger;
 
@@ -45,10 +45,7 @@ use crate::run::robot_z::RobotZ;
 use crate::run::runner::Runner;
 
 use capture::CapturePipeline;
-pub use control::Ending;
-use control::{
-    ControlThread, ExtruderWatch, LiveInputs, Notices, SetpointClock, StatusLine, StepsWatch,
-};
+use control::{ControlSettings, ControlThread, Ending, ExtruderWatch, LiveInputs, Operator};
 use journal::Journal;
 use run_logger::RunLogger;
 
@@ -78,10 +75,8 @@ pub struct LiveRun {
     pub ends_with_steps: bool,
     /// Receives a message when the run is to end.
     pub stop: Receiver<()>,
-    /// Called with messages for the operator.
-    pub notice: Box<dyn FnMut(&str) + Send>,
-    /// Called with a line about the run, each of which replaces the one before.
-    pub status: Box<dyn FnMut(&str) + Send>,
+    /// What reaches the operator.
+    pub operator: Operator,
 }
 
 /// The extruder of a live run.
@@ -172,43 +167,30 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
     let logger = RunLogger::start(live.log)?;
     let watch = live.extruder.as_ref().map(|side| {
         let driver = Arc::clone(&side.driver);
-        ExtruderWatch::new(driver, side.range(), side.setup.feedforward_period)
+        let as_received = Box::new(move |command| driver.as_received(command));
+        ExtruderWatch::new(as_received, side.range(), side.setup.feedforward_period)
     });
     let mut controller = Controller::new(live.cell.controller_setup(&live.run, &live.calibration));
     if let Some(side) = live.extruder {
         controller = controller.with_extruder(side.setup, side.demand);
     }
-    let status_line = StatusLine::new(watch.is_some());
-    let mut control = ControlThread {
-        inputs: LiveInputs {
-            clock: live.clock,
-            camera: capture.seen.clone(),
-            robot: from_robot,
-            extruder: from_extruder,
-            alarm,
-            stop: live.stop,
-        },
-        runner: Runner::with_extruder(controller, robot, extruder, recorder),
-        extruder: watch,
-        setpoints: SetpointClock::new(
-            live.clock.now(),
-            Span::from_secs(1.0 / live.run.robot.rate_hz),
-        ),
-        duration: live.duration,
-        robot_z,
-        robot_view,
-        latencies: latency::Latencies::default(),
-        journal: &logger,
-        notice: live.notice,
-        status: live.status,
-        status_line,
+    let settings = ControlSettings {
+        rate_hz: live.run.robot.rate_hz,
         limits: live.run.limits,
-        unfit: None,
-        steps: live.ends_with_steps.then(StepsWatch::default),
-        notices: Notices::default(),
-        speed: None,
-        setpoint: None,
+        duration: live.duration,
+        ends_with_steps: live.ends_with_steps,
     };
+    let inputs = LiveInputs {
+        clock: live.clock,
+        camera: capture.seen.clone(),
+        robot: from_robot,
+        extruder: from_extruder,
+        alarm,
+        stop: live.stop,
+    };
+    let runner = Runner::with_extruder(controller, robot, extruder, recorder);
+    let mut control = ControlThread::new(settings, inputs, runner, watch, &logger, live.operator);
+    (control.robot_z, control.robot_view) = (robot_z, robot_view);
     let ending = control.run();
     let pump_runs = control.extruder.as_ref().is_some_and(|side| !side.rests());
     drop(camera_stop);

@@ -20,6 +20,8 @@ pub mod light;
 pub mod melt;
 pub mod melt_log;
 pub mod motion;
+pub mod nozzle;
+pub mod other_bead;
 pub mod outline;
 pub mod pressure;
 pub mod render;

@@ -11,7 +11,7 @@ use structure::{circles, constants, uses};
 
 /// Every room with the rooms that it may use. A room stands after all that it uses, so
 /// that there is no circle.
-const ROOMS: [(&str, &[&str]); 27] = [
+const ROOMS: [(&str, &[&str]); 28] = [
     ("core", &[]),
     ("numeric", &[]),
     ("document", &[]),
@@ -129,6 +129,24 @@ const ROOMS: [(&str, &[&str]); 27] = [
         ],
     ),
     (
+        "rehearsal",
+        &[
+            "core",
+            "calibration",
+            "vision",
+            "extruder",
+            "scenario",
+            "control",
+            "cell",
+            "link",
+            "run",
+            "sim",
+            "drivers",
+            "rows",
+            "live",
+        ],
+    ),
+    (
         "report",
         &[
             "core",
@@ -167,6 +185,8 @@ const ROOMS: [(&str, &[&str]); 27] = [
             "sim",
             "trials",
             "io",
+            "assembly",
+            "rehearsal",
             "report",
         ],
     ),

@@ -17,6 +17,7 @@ use crate::io::clock::RunClock;
 use crate::io::progress::StatusDisplay;
 use crate::io::recorder::{ExtruderFile, RecordConfig};
 use crate::io::stop::StopSignal;
+use crate::live::control::Operator;
 use crate::live::{self, LiveExtruder, LiveReport, LiveRun};
 use crate::report::run::RunPage;
 use crate::rows::log::{ControlFacts, LogOptions, RunLog};
@@ -102,15 +103,17 @@ pub fn live(
         duration: until.duration_s.map(Span::from_secs),
         ends_with_steps: until.ends_with_steps,
         stop: stop.signals().clone(),
-        notice: Box::new(move |line| {
-            if !quiet {
-                above.note(line);
-            }
-        }),
-        status: Box::new({
-            let status = status.clone();
-            move |line| status.show(line)
-        }),
+        operator: Operator {
+            notice: Box::new(move |line| {
+                if !quiet {
+                    above.note(line);
+                }
+            }),
+            status: Box::new({
+                let status = status.clone();
+                move |line| status.show(line)
+            }),
+        },
         cell: loaded.cell.clone(),
     });
     status.finish();

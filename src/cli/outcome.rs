@@ -4,7 +4,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use super::status::WITH_LOSS;
-use crate::live::{Ending, LiveReport};
+use crate::live::LiveReport;
+use crate::live::control::Ending;
 use crate::rows::names;
 use crate::rows::summary::Summary;
 use crate::rows::summary::tolerance::ToleranceSummary;

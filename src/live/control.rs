@@ -40,29 +40,82 @@ const SHUTDOWN_TIMEOUT: Span = Span::from_millis(600);
 /// The runner of a live run.
 pub type LiveRunner<K> = Runner<Box<dyn RobotPort>, K, Option<Box<dyn ExtruderPort>>>;
 
-/// State of the control thread.
-pub struct ControlThread<'a, I, K> {
-    pub inputs: I,
-    pub runner: LiveRunner<K>,
-    pub extruder: Option<ExtruderWatch>,
-    pub setpoints: SetpointClock,
-    pub duration: Option<Span>,
-    pub robot_z: RobotZ,
-    pub robot_view: Option<RobotView>,
-    pub latencies: Latencies,
-    pub journal: &'a dyn Journal,
-    pub notice: Box<dyn FnMut(&str) + Send>,
-    pub status: Box<dyn FnMut(&str) + Send>,
-    pub status_line: StatusLine,
+/// When the control thread acts, and what ends it.
+#[derive(Debug, Clone, Copy)]
+pub struct ControlSettings {
+    /// Setpoints a second.
+    pub rate_hz: f64,
+    /// The cell's limits, within which those of its robot must lie.
     pub limits: SpeedLimits,
-    pub unfit: Option<Ending>,
-    pub steps: Option<StepsWatch>,
-    pub notices: Notices,
-    pub speed: Option<MmPerS>,
-    pub setpoint: Option<MmPerS>,
+    /// Duration of the run; `None` for a run without a time limit.
+    pub duration: Option<Span>,
+    /// Whether to end when a sequence of speed steps is over.
+    pub ends_with_steps: bool,
 }
 
-impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
+/// What reaches the operator.
+pub struct Operator {
+    /// Called with messages.
+    pub notice: Box<dyn FnMut(&str) + Send>,
+    /// Called with a line about the run, each of which replaces the one before.
+    pub status: Box<dyn FnMut(&str) + Send>,
+}
+
+/// The control thread.
+pub struct ControlThread<'a, I, K> {
+    /// What it waits for, and its clock.
+    pub inputs: I,
+    /// The controller with its ports and its recorder.
+    pub runner: LiveRunner<K>,
+    /// What is known of the extruder, where one is commanded.
+    pub extruder: Option<ExtruderWatch>,
+    /// Heights of the nozzle, which the measurement reads.
+    pub robot_z: RobotZ,
+    /// A rendered camera, which follows the robot's reports.
+    pub robot_view: Option<RobotView>,
+    settings: ControlSettings,
+    setpoints: SetpointClock,
+    latencies: Latencies,
+    journal: &'a dyn Journal,
+    operator: Operator,
+    status_line: StatusLine,
+    unfit: Option<Ending>,
+    steps: Option<StepsWatch>,
+    notices: Notices,
+    speed: Option<MmPerS>,
+    setpoint: Option<MmPerS>,
+}
+
+impl<'a, I: Inputs, K: Recorder> ControlThread<'a, I, K> {
+    /// Before the first input; the extruder is watched where one is commanded.
+    pub fn new(
+        settings: ControlSettings,
+        inputs: I,
+        runner: LiveRunner<K>,
+        extruder: Option<ExtruderWatch>,
+        journal: &'a dyn Journal,
+        operator: Operator,
+    ) -> Self {
+        Self {
+            setpoints: SetpointClock::new(inputs.now(), Span::from_secs(1.0 / settings.rate_hz)),
+            status_line: StatusLine::new(extruder.is_some()),
+            steps: settings.ends_with_steps.then(StepsWatch::default),
+            settings,
+            inputs,
+            runner,
+            extruder,
+            robot_z: RobotZ::default(),
+            robot_view: None,
+            latencies: Latencies::default(),
+            journal,
+            operator,
+            unfit: None,
+            notices: Notices::default(),
+            speed: None,
+            setpoint: None,
+        }
+    }
+
     /// Runs until an ending occurs, then shuts down.
     pub fn run(&mut self) -> Ending {
         let ending = self.until_ended();
@@ -104,7 +157,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     fn until_ended(&mut self) -> Ending {
         let start = self.inputs.now();
         let mut extruder_due = self.extruder.as_ref().map(|side| start + side.period());
-        let over = self.duration.map(|duration| start + duration);
+        let over = self.settings.duration.map(|duration| start + duration);
         let mut lost: Option<String> = None;
         loop {
             let now = self.inputs.now();
@@ -142,13 +195,13 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
                     self.unreadable(seq, at, &reason);
                 }
                 Some(LiveInput::Camera(CameraMessage::Waiting(reason))) => {
-                    (self.notice)(&format!("waiting for the camera {reason}"));
+                    (self.operator.notice)(&format!("waiting for the camera {reason}"));
                 }
                 Some(LiveInput::Camera(CameraMessage::Ended(None)) | LiveInput::CameraGone) => {
                     return Ending::LastFrame;
                 }
                 Some(LiveInput::Camera(CameraMessage::Ended(Some(reason)))) => {
-                    (self.notice)(&format!("camera lost: {reason}"));
+                    (self.operator.notice)(&format!("camera lost: {reason}"));
                     self.give(Event::CameraLost { reason: reason.clone() });
                     lost = Some(reason);
                     self.inputs.ignore_camera();
@@ -197,10 +250,10 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     /// Tells the operator what a step brings.
     fn show(&mut self, now: Stamp, event: &Event, step: &Step) {
         for words in self.notices.of(now, step) {
-            (self.notice)(&words);
+            (self.operator.notice)(&words);
         }
         if let Some(line) = self.status_line.of(now, event, step) {
-            (self.status)(&line);
+            (self.operator.status)(&line);
         }
     }
 

@@ -2,7 +2,7 @@
 //! Events come in the order of time. At the same time the order is: the robot's report, the
 //! extruder's report, the capture of a frame, a setpoint, a step of the extruder side.
 
-mod camera;
+pub mod camera;
 mod clock;
 pub mod observer;
 mod port;
@@ -16,12 +16,11 @@ use crate::extruder::{ExtruderSetup, ExtruderState, FlowDemand};
 use crate::link::{ParamError, RobotParams, VirtualRobot};
 use crate::run::ports::Recorder;
 use crate::run::runner::{Handled, Runner};
-use crate::scenario::bead::BeadModel;
-use crate::scenario::disturbance::Flow;
 
 use super::extruder::SimExtruder;
-use super::hash;
-use super::laid::{LaidBead, PathSpeed};
+use super::laid::LaidBead;
+use super::nozzle::Nozzle;
+use super::other_bead::OtherView;
 use super::render::RenderError;
 
 pub use camera::FrameObservation;
@@ -38,11 +37,6 @@ const MAX_LAYER_S: f64 = 86_400.0;
 /// Acceleration limit of the simulated robot \[mm/s²\]: in effect none, because the cell already
 /// limits its setpoints.
 const ROBOT_ACCEL: MmPerS2 = MmPerS2::constant(1e6);
-/// Fraction of the start speed at which the start is over.
-const STARTED_FRACTION: f64 = 0.99;
-
-/// Fraction of the nominal flow below which no bead is laid.
-const MIN_FLOW_FRACTION: f64 = 1e-3;
 
 /// A commanded extruder: the controller's side and the plant.
 #[derive(Debug)]
@@ -73,23 +67,14 @@ pub struct SimCell<K> {
     run: RunPart,
     cell: Cell,
     runner: Runner<SimPort, K, Option<SimExtruder>>,
-    /// Flow at which the bead model gives the width; `None` if no extruder is commanded.
-    nominal_flow: Option<Mm3PerS>,
+    nozzle: Nozzle,
     camera: SimCamera,
-    bead: LaidBead,
-    /// The bead that the camera sees in place of it, from a path on \[mm\].
-    other_bead: Option<(f64, LaidBead)>,
+    /// The bead that the camera sees in place of the one that is laid.
+    other: Option<OtherView>,
     now: Stamp,
     layers: u64,
-    /// Phase of the pump's pulsation, in periods.
-    pulse_phase: f64,
     /// Widths that have not arrived yet, oldest first.
     pending_widths: VecDeque<Arrival>,
-    /// Path of the nozzle at the start of the layer \[mm\].
-    bead_start: f64,
-    /// End of the laid bead, with its path counted from `bead_start`.
-    laid_to: PathSpeed,
-    started: bool,
     speed: Option<MmPerS>,
     setpoint: Option<MmPerS>,
 }
@@ -159,38 +144,27 @@ impl<K: Recorder> SimCell<K> {
         let mut sim = Self {
             camera: SimCamera::new(cell, calibration)?,
             runner: Runner::with_extruder(controller, port, plant, recorder),
-            nominal_flow,
+            nozzle: Nozzle::new(simulation, run.robot.start_speed, nominal_flow),
             run: run.clone(),
             cell: cell.clone(),
-            bead: Self::fresh_bead(cell, 0),
-            other_bead: other_bead(cell, run),
+            other: OtherView::of_cell(cell, run),
             now: Stamp::START,
             layers: 0,
-            pulse_phase: hash::unit(hash::mix(&[simulation.seed, PULSE_STREAM])),
             pending_widths: VecDeque::new(),
-            bead_start: 0.0,
-            laid_to: PathSpeed { path_mm: 0.0, speed_mm_per_s: 0.0 },
-            started: false,
             speed: None,
             setpoint: None,
         };
         let robot = sim.runner.robot_mut().connect(Stamp::START);
         let _ = sim.runner.handle(Stamp::START, &Event::LinkUp { robot });
-        if sim.nominal_flow.is_some() {
+        if nominal_flow.is_some() {
             let _ = sim.runner.handle(Stamp::START, &Event::ExtruderUp);
         }
         Ok(sim)
     }
 
-    fn fresh_bead(cell: &Cell, layer: u64) -> LaidBead {
-        let simulation = &cell.simulation;
-        let seed = hash::mix(&[simulation.seed, layer]);
-        LaidBead::new(simulation.bead, simulation.roughness, simulation.flow, seed)
-    }
-
     /// The bead of the current layer, by the path since the layer's start.
     pub fn bead(&self) -> &LaidBead {
-        &self.bead
+        self.nozzle.bead()
     }
 
     /// Returns the recorder at the end of the simulation.
@@ -201,12 +175,9 @@ impl<K: Recorder> SimCell<K> {
     /// Lays one bead with the nozzle at height `z`; the observer gets every event. Ends early if
     /// the robot stops or the observer is done.
     pub fn layer(&mut self, z: Mm, observer: &mut impl Observer) -> LayerEnd {
-        self.bead = Self::fresh_bead(&self.cell, self.layers);
         self.camera.raise(self.cell.rise(Some(z)));
-        self.bead_start = self.runner.robot_mut().begin(self.now, z).path_mm.get();
-        let speed_mm_per_s = self.run.robot.start_speed.get();
-        self.laid_to = PathSpeed { path_mm: 0.0, speed_mm_per_s };
-        self.started = false;
+        let start = self.runner.robot_mut().begin(self.now, z).path_mm;
+        self.nozzle.begin(self.layers, start);
         let mut clock = Ticker::new(&self.cell, &self.run, self.now, self.layers);
         let began = self.now;
         self.layers += 1;
@@ -289,49 +260,19 @@ impl<K: Recorder> SimCell<K> {
     /// Lays the bead up to the nozzle's current position.
     fn lay(&mut self) {
         let state = self.runner.robot_mut().state(self.now);
-        let path = state.path_mm.get() - self.bead_start;
-        let speed = self.equivalent_speed(state.speed_mm_per_s.get());
-        let last = self.laid_to;
-        let pulse = self.cell.simulation.flow.pulse_at(self.now.secs(), self.pulse_phase);
-        self.bead.set_pulse(pulse);
-        if path > last.path_mm && matches!(state.mode, RobotMode::Print | RobotMode::Hold) {
-            // A piece without a bead is a gap.
-            if let Some(speed) = speed {
-                self.bead.lay_ramp(last, PathSpeed { path_mm: path, speed_mm_per_s: speed });
-            }
-            let speed_mm_per_s = speed.unwrap_or(last.speed_mm_per_s);
-            self.laid_to = PathSpeed { path_mm: path, speed_mm_per_s };
-        }
-    }
-
-    /// Speed for the bead model: at this speed the nominal flow lays the same width as the current
-    /// flow at the robot's speed. `None` if nothing flows.
-    ///
-    /// Without a commanded extruder the flow follows the speed while the robot starts: the bead
-    /// begins with the width of the start speed.
-    fn equivalent_speed(&mut self, speed: f64) -> Option<f64> {
-        let now = self.now;
-        let Some(nominal) = self.nominal_flow else {
-            let start_speed = self.run.robot.start_speed.get();
-            if self.started {
-                return Some(speed);
-            }
-            self.started = speed >= STARTED_FRACTION * start_speed;
-            return Some(start_speed);
-        };
-        let extruder = self.runner.extruder_mut().as_mut()?;
-        extruder.advance(now);
-        let fraction = extruder.flow() / nominal;
-        (fraction > MIN_FLOW_FRACTION).then(|| speed / fraction)
+        let flow = self.runner.extruder_mut().as_mut().map(|extruder| {
+            extruder.advance(self.now);
+            extruder.flow()
+        });
+        self.nozzle.lay(self.now, &state, flow);
     }
 
     /// Takes an image; its width arrives after the latency.
     fn take_frame(&mut self, observer: &mut impl Observer) {
         let state = self.runner.robot_mut().state(self.now);
-        let path = state.path_mm.get() - self.bead_start;
-        let under = path - self.run.camera.offset.get();
-        let other = self.other_bead.as_ref().filter(|(from, _)| path >= *from);
-        let bead = other.map_or(&self.bead, |(_, bead)| bead);
+        let path_mm = self.nozzle.along_mm(state.path_mm);
+        let under = path_mm - self.run.camera.offset.get();
+        let bead = OtherView::seen_at(self.other.as_ref(), path_mm).unwrap_or(self.nozzle.bead());
         let taken = self.camera.take(self.now, under, state.z_mm, bead);
         let simulation = &self.cell.simulation;
         let arrival = Arrival {
@@ -362,8 +303,9 @@ impl<K: Recorder> SimCell<K> {
                 width_mm: measured.width,
                 sigma_mm: measured.sigma,
             },
-            Err(status) => {
-                Event::Rejected { frame: taken.seq, captured_at, reason: (*status).to_owned() }
+            Err(reject) => {
+                let reason = reject.status().to_owned();
+                Event::Rejected { frame: taken.seq, captured_at, reason }
             }
         };
         let handled = self.handle(&event, observer);
@@ -373,7 +315,7 @@ impl<K: Recorder> SimCell<K> {
         observer.frame(&FrameObservation {
             seq: taken.seq,
             captured_at,
-            outcome: taken.outcome,
+            outcome: taken.outcome.map_err(|reject| reject.status()),
             frame: taken.frame.as_ref(),
             edges: (newest && taken.frame.is_some()).then(|| self.camera.edges()),
             truth: taken.truth,
@@ -385,23 +327,6 @@ impl<K: Recorder> SimCell<K> {
     }
 }
 
-/// The other bead of a simulation, all along the path, and the path from which on it is seen \[mm\].
-fn other_bead(cell: &Cell, run: &RunPart) -> Option<(f64, LaidBead)> {
-    let simulation = &cell.simulation;
-    let other = simulation.other_bead?;
-    let model = BeadModel {
-        width_mm: other.width.get(),
-        exponent: 0.0,
-        slow_exponent: 0.0,
-        ..simulation.bead
-    };
-    let seed = hash::mix(&[simulation.seed, OTHER_STREAM]);
-    let mut bead = LaidBead::new(model, simulation.roughness, Flow::STEADY, seed);
-    let beyond = (run.camera.offset + simulation.gauge_length).get();
-    bead.lay(-beyond, simulation.path.get() + beyond, run.robot.start_speed.get());
-    Some((other.from.get(), bead))
-}
-
 /// A width that has not yet arrived at the controller.
 struct Arrival {
     at: Stamp,
@@ -410,11 +335,6 @@ struct Arrival {
     position_mm: f64,
     taken: CapturedFrame,
 }
-
-/// Random stream of another bead. Derived: the bytes of "other".
-const OTHER_STREAM: u64 = 0x006f_7468_6572;
-/// Random stream of the phase of the pulsation. Derived: the bytes of "pulse".
-const PULSE_STREAM: u64 = 0x0070_756c_7365;
 
 #[cfg(test)]
 mod tests;

@@ -8,12 +8,14 @@ use crate::numeric::lti::ModelError;
 use crate::run::ports::{ExtruderPort, SendError, Sent};
 
 mod filled;
+mod gated;
 mod linear;
 mod molten;
 mod plant;
 mod pressed;
 
 pub use filled::Filled;
+pub use gated::GatedExtruder;
 pub use linear::LinearPlantSim;
 pub use molten::Molten;
 pub use plant::{STEP, SimPlant};

@@ -10,11 +10,11 @@ use crate::core::Span;
 use crate::extruder::{ExtruderCommand, ExtruderLimits, PumpMode};
 use crate::io::clock::RunClock;
 use crate::link::extruder::{ExtruderEndpoint, ExtruderFaults};
-use crate::sim::extruder::SimExtruder;
+use crate::sim::extruder::{GatedExtruder, SimExtruder};
 
 mod machine;
 
-use machine::{ExtruderMachine, GatedPlant, SharedExtruder};
+use machine::{ExtruderMachine, SharedExtruder};
 
 /// Parameters of the simulation.
 #[derive(Debug)]
@@ -49,7 +49,7 @@ impl ExtruderSim {
         notice: Notice,
     ) -> io::Result<Self> {
         let gate = ExtruderEndpoint::new(options.hello, options.clock_start_ms);
-        let gated = GatedPlant::new(clock.now(), gate, options.plant, options.fails_after);
+        let gated = GatedExtruder::new(clock.now(), gate, options.plant, options.fails_after);
         let shared = Arc::new(SharedExtruder::new(clock, gated));
         let machine = ExtruderMachine::new(Arc::clone(&shared));
         let server = Server::spawn(listener, clock, options.state_period, machine, notice)?;

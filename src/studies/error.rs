@@ -1,6 +1,7 @@
 //! Errors of the experiments.
 
 use super::bcs_thesis::corner::CornerError;
+use crate::assembly::AssemblyError;
 use crate::document::Problems;
 use crate::extruder::adaptive::SubSystemError;
 use crate::extruder::feedforward::FeedforwardError;
@@ -23,6 +24,9 @@ pub enum ReproduceError {
     /// That cell file lacks tables that a run needs.
     #[error("the cell of the experiments is not complete enough for a run")]
     NoRun,
+    /// A cell that comes with the program cannot be used.
+    #[error(transparent)]
+    Assembly(#[from] AssemblyError),
     /// The simulated cell cannot be set up.
     #[error(transparent)]
     Sim(#[from] SimCellError),

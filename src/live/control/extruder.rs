@@ -14,7 +14,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
     pub(super) fn take_extruder_event(&mut self, event: ExtruderEvent) {
         let Some(watch) = &mut self.extruder else { return };
         if let Some(words) = watch.note(&event) {
-            (self.notice)(&words);
+            (self.operator.notice)(&words);
         }
         if let ExtruderEvent::Up { limits, .. } = &event
             && let Some(why) = watch.unfit(limits)
@@ -41,6 +41,6 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             }
             state => state.name().to_owned(),
         };
-        (self.notice)(&format!("{:8.2} s  extruder {words}", now.secs()));
+        (self.operator.notice)(&format!("{:8.2} s  extruder {words}", now.secs()));
     }
 }

@@ -1,15 +1,14 @@
 //! The control thread's state of its extruder.
 
-use std::sync::Arc;
-
 use crate::core::{RefusalReason, Span};
-use crate::drivers::extruder::{DriveRange, ExtruderDriver};
+use crate::drivers::extruder::DriveRange;
 use crate::extruder::{ExtruderLimits, ExtruderState, PumpMode};
 use crate::run::ports::ExtruderEvent;
 
 /// The control thread's state of its extruder.
 pub struct ExtruderWatch {
-    driver: Arc<dyn ExtruderDriver>,
+    /// A command rounded to the steps of the link.
+    as_received: Box<dyn Fn(f64) -> f64 + Send>,
     range: DriveRange,
     period: Span,
     /// Last state that was shown to the operator.
@@ -20,15 +19,20 @@ pub struct ExtruderWatch {
 }
 
 impl ExtruderWatch {
-    /// For an extruder without a report yet; `period` is the time between steps of its side.
-    pub fn new(driver: Arc<dyn ExtruderDriver>, range: DriveRange, period: Span) -> Self {
+    /// For an extruder without a report yet: how it receives a command, the commands of the cell,
+    /// and the time between steps of its side.
+    pub fn new(
+        as_received: Box<dyn Fn(f64) -> f64 + Send>,
+        range: DriveRange,
+        period: Span,
+    ) -> Self {
         let (shown, refused) = (ExtruderState::Off, Vec::new());
-        Self { driver, range, period, shown, refused, pump: None }
+        Self { as_received, range, period, shown, refused, pump: None }
     }
 
     /// Why the cell cannot command an extruder; `None` if it can.
     pub(super) fn unfit(&self, extruder: &ExtruderLimits) -> Option<String> {
-        self.range.unfit(extruder, |command| self.driver.as_received(command))
+        self.range.unfit(extruder, &self.as_received)
     }
 
     /// Time between steps of the extruder side.

@@ -13,11 +13,13 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
         match &event {
             RobotEvent::State { at, state } => return self.take_robot_state(*at, *state),
             RobotEvent::Up { limits: robot, .. } => {
-                (self.notice)(&format!("robot `{}` is connected", robot.name));
-                self.unfit = unfit(&self.limits, robot).map(Ending::RobotLimits);
+                (self.operator.notice)(&format!("robot `{}` is connected", robot.name));
+                self.unfit = unfit(&self.settings.limits, robot).map(Ending::RobotLimits);
             }
-            RobotEvent::Down { reason, .. } => (self.notice)(&format!("robot: {reason}")),
-            RobotEvent::Refused { text, .. } => (self.notice)(&format!("robot refused {text}")),
+            RobotEvent::Down { reason, .. } => (self.operator.notice)(&format!("robot: {reason}")),
+            RobotEvent::Refused { text, .. } => {
+                (self.operator.notice)(&format!("robot refused {text}"))
+            }
         }
         self.give(event.into());
     }

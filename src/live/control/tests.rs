@@ -160,26 +160,18 @@ impl<K: Recorder> Run<K> {
         let said = Arc::new(Mutex::new(Vec::new()));
         let heard = Arc::clone(&said);
         let robot: Box<dyn RobotPort> = Box::new(robot);
-        let mut thread = ControlThread {
-            inputs: self.script,
-            runner: Runner::with_extruder(controller, robot, None, self.recorder),
-            extruder: None,
-            setpoints: SetpointClock::new(Stamp::START, Span::from_secs(1.0 / RATE_HZ)),
-            duration: self.duration,
-            robot_z: RobotZ::default(),
-            robot_view: None,
-            latencies: Latencies::default(),
-            journal: &notes,
-            notice: Box::new(move |line| heard.lock().unwrap().push(line.to_owned())),
+        let settings = ControlSettings {
+            rate_hz: RATE_HZ,
             limits: self.limits,
-            unfit: None,
-            steps: None,
-            status: Box::new(|_| {}),
-            status_line: StatusLine::new(false),
-            notices: Notices::default(),
-            speed: None,
-            setpoint: None,
+            duration: self.duration,
+            ends_with_steps: false,
         };
+        let runner = Runner::with_extruder(controller, robot, None, self.recorder);
+        let operator = Operator {
+            notice: Box::new(move |line| heard.lock().unwrap().push(line.to_owned())),
+            status: Box::new(|_| {}),
+        };
+        let mut thread = ControlThread::new(settings, self.script, runner, None, &notes, operator);
         let ending = thread.run();
         let ended_at = thread.inputs.now;
         drop(thread);

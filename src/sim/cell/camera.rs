@@ -42,13 +42,19 @@ pub struct FrameObservation<'a> {
 }
 
 /// One image and its width.
+#[derive(Debug)]
 pub struct CapturedFrame {
+    /// Its number.
     pub seq: u64,
-    pub outcome: Result<WidthMeasurement, &'static str>,
+    /// The width, or why the frame was rejected.
+    pub outcome: Result<WidthMeasurement, Reject>,
+    /// The image, if one was rendered.
     pub frame: Option<Frame>,
+    /// The result of a perfect measurement of that image.
     pub truth: Option<Truth>,
 }
 
+/// The camera, and what measures its images.
 pub struct SimCamera {
     level: WidthSource,
     seed: u64,
@@ -72,6 +78,7 @@ pub struct SimCamera {
 }
 
 impl SimCamera {
+    /// The camera of a cell. Fails if the cell's bead cannot be rendered.
     pub fn new(cell: &Cell, calibration: Calibration) -> Result<Self, RenderError> {
         let simulation = &cell.simulation;
         let renderer = Renderer::of_cell(cell, &calibration)?;
@@ -124,12 +131,11 @@ impl SimCamera {
                 let edges = |along: f64| bead.edges_at(position_mm + along);
                 match self.renderer.render(seq, now, z, &edges) {
                     Err(_) => {
-                        let outcome = Err(Reject::OffSurface.status());
+                        let outcome = Err(Reject::OffSurface);
                         CapturedFrame { seq, outcome, frame: None, truth: None }
                     }
                     Ok(rendered) => {
-                        let found = self.measurer.measure(&rendered.frame, &surface);
-                        let outcome = found.map_err(|reject| reject.status());
+                        let outcome = self.measurer.measure(&rendered.frame, &surface);
                         let (frame, truth) = (Some(rendered.frame), rendered.truth);
                         CapturedFrame { seq, outcome, frame, truth }
                     }
@@ -145,14 +151,14 @@ impl SimCamera {
         position_mm: f64,
         bead: &LaidBead,
         surface: &SurfaceMap,
-    ) -> Result<WidthMeasurement, &'static str> {
+    ) -> Result<WidthMeasurement, Reject> {
         let half = self.gauge_length / 2.0;
         let truth = if half > 0.0 {
             bead.mean_width(position_mm - half, position_mm + half)
         } else {
             bead.width_at(position_mm)
         };
-        let refused = Reject::NoPair { got: 0.0, need: 1.0 }.status();
+        let refused = Reject::NoPair { got: 0.0, need: 1.0 };
         let truth = truth.ok_or(refused)?;
         let [noise, _] = hash::normal_pair(hash::mix(&[self.seed, NOISE_STREAM, seq]));
         if hash::unit(hash::mix(&[self.seed, MISSING_STREAM, seq])) < self.missing_fraction {
@@ -163,7 +169,7 @@ impl SimCamera {
         let WidthRange { min, max } = self.width_range;
         if !(min..=max).contains(&width) {
             let (got_mm, min_mm, max_mm) = (width.get(), min.get(), max.get());
-            return Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm }.status());
+            return Err(Reject::WidthOutOfRange { got_mm, min_mm, max_mm });
         }
         let (left, right) = self.edge_points(width, surface).ok_or(refused)?;
         Ok(WidthMeasurement {

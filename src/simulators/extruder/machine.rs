@@ -2,94 +2,28 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::core::{Span, Stamp};
-use crate::extruder::{ExtruderCommand, PumpMode};
+use crate::core::Stamp;
+use crate::extruder::PumpMode;
 use crate::io::clock::RunClock;
 use crate::link::LineError;
-use crate::link::extruder::{DriveLine, ExtruderEndpoint, ExtruderLine, pump_word};
-use crate::run::ports::ExtruderPort;
-use crate::sim::extruder::SimExtruder;
+use crate::link::extruder::{DriveLine, ExtruderLine, pump_word};
+use crate::sim::extruder::GatedExtruder;
 use crate::simulators::machine::{Answer, LineOutcome, LinkMachine};
 
 /// State that the extruder's thread and the handle share.
 #[derive(Debug)]
 pub(super) struct SharedExtruder {
     pub(super) clock: RunClock,
-    gated: Mutex<GatedPlant>,
-}
-
-/// The endpoint of the link and the plant.
-#[derive(Debug)]
-pub(super) struct GatedPlant {
-    gate: ExtruderEndpoint,
-    plant: SimExtruder,
-    applied: ExtruderCommand,
-    fails_after: Option<Span>,
-    ran_since: Option<Stamp>,
+    gated: Mutex<GatedExtruder>,
 }
 
 impl SharedExtruder {
-    pub(super) fn new(clock: RunClock, works: GatedPlant) -> Self {
+    pub(super) fn new(clock: RunClock, works: GatedExtruder) -> Self {
         Self { clock, gated: Mutex::new(works) }
     }
 
-    pub(super) fn gated(&self) -> MutexGuard<'_, GatedPlant> {
+    pub(super) fn gated(&self) -> MutexGuard<'_, GatedExtruder> {
         self.gated.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl GatedPlant {
-    pub(super) fn new(
-        now: Stamp,
-        mut gate: ExtruderEndpoint,
-        plant: SimExtruder,
-        fails_after: Option<Span>,
-    ) -> Self {
-        let applied = gate.command(now);
-        Self { gate, plant, applied, fails_after, ran_since: None }
-    }
-
-    /// The extruder's endpoint of the link.
-    pub(super) fn gate(&mut self) -> &mut ExtruderEndpoint {
-        &mut self.gate
-    }
-
-    /// The simulated plant.
-    pub(super) fn plant(&mut self) -> &mut SimExtruder {
-        &mut self.plant
-    }
-
-    /// Last command to pump and valve.
-    pub(super) fn command(&self) -> ExtruderCommand {
-        self.applied
-    }
-
-    /// Advances to a time; the plant gets the valid commands from the link.
-    pub(super) fn advance(&mut self, now: Stamp) {
-        if let (Some(after), Some(since)) = (self.fails_after, self.ran_since)
-            && now - since >= after
-        {
-            self.fails_after = None;
-            self.gate.fail();
-        }
-        // A command expires at its own time, even between two calls.
-        if let Some(until) = self.gate.runs_out().filter(|&until| until < now) {
-            self.apply(until);
-        }
-        self.apply(now);
-        if self.ran_since.is_none() && self.applied.pump_on {
-            self.ran_since = Some(now);
-        }
-    }
-
-    /// Advances to a time and applies the command of that time.
-    fn apply(&mut self, at: Stamp) {
-        self.plant.advance(at);
-        let command = self.gate.command(at);
-        if command != self.applied {
-            self.applied = command;
-            let _ = self.plant.send(at, command);
-        }
     }
 }
 

@@ -54,21 +54,22 @@ pub fn laid(cell: &Cell, states: &[(Stamp, RobotState)]) -> Option<LayerTrial> {
     for (at, state) in states {
         follower.observe(*at, state);
     }
+    let control_start_mm = control_start_mm(states)?;
+    Some(LayerTrial::of_bead(follower.bead(), BEAD_MM, control_start_mm, TARGET_MM))
+}
+
+/// Path of a robot at its last state at the start speed: the first controlled setpoint came after
+/// it \[mm\]. `None` where control never began.
+pub fn control_start_mm(states: &[(Stamp, RobotState)]) -> Option<f64> {
     let prints = states.iter().map(|one| one.1).filter(|one| one.mode == RobotMode::Print);
     let at_start = |speed: f64| (speed / START_MM_PER_S - 1.0).abs() < CONTROLLED;
     let mut before = prints.skip_while(|one| one.path_mm.get() < 0.9 * START_MM);
-    // The last state at the start speed: the first controlled setpoint came after it.
-    let mut control_start_mm = before.next()?.path_mm.get();
+    let mut start_mm = before.next()?.path_mm.get();
     for state in before {
         if !at_start(state.speed_mm_per_s.get()) {
-            return Some(LayerTrial::of_bead(
-                follower.bead(),
-                BEAD_MM,
-                control_start_mm,
-                TARGET_MM,
-            ));
+            return Some(start_mm);
         }
-        control_start_mm = state.path_mm.get();
+        start_mm = state.path_mm.get();
     }
     None
 }

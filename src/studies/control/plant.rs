@@ -6,8 +6,10 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::cell::file::{Cell, Purpose, RunPart};
-use crate::core::{Mm, MmPerS};
+use crate::core::{Mm, MmPerS, Span};
 use crate::numeric::root::{BISECTIONS, bisect};
+use crate::rehearsal::fault::Fault;
+use crate::rehearsal::{Rehearsal, Rehearsed};
 use crate::sim::hash;
 use crate::studies::barjuei2022::scale;
 use crate::studies::error::ReproduceError;
@@ -129,6 +131,19 @@ impl Plan {
     pub fn lay(&self, seed: u64) -> Result<LayerTrial, ReproduceError> {
         let Self { cell, run, assumed_offset } = self;
         Ok(LayerTrial::lay_mismatched(cell, run, &scale(), *assumed_offset, seed)?)
+    }
+
+    /// Lays it with one seed in a live run on a virtual clock, in which something may fail.
+    pub fn rehearse(
+        &self,
+        seed: u64,
+        faults: Vec<Fault>,
+        duration: Span,
+    ) -> Result<Rehearsed, ReproduceError> {
+        let (mut cell, run, calibration) = (self.cell.clone(), &self.run, &scale());
+        cell.simulation.seed = seed + 1;
+        let (cell, extruder) = (&cell, None);
+        Ok(Rehearsal { cell, run, calibration, extruder, faults, duration }.run()?)
     }
 
     /// A number for each seed from 0 on, in parallel.
