@@ -11,10 +11,21 @@ const SPEED_MARGIN: f64 = 1.2;
 /// (`docs/src/reference/robot-link.md`, § Robot to PC).
 const STEP_MARGIN: Mm = Mm::constant(10.0);
 
+/// Largest delay of a report that its clock is believed for. Derived: that of
+/// `width_control::speed_history`; behind a longer one the clocks of robot and PC may differ.
+const MAX_DELAY: Span = Span::from_millis(30);
+/// Resolution of a robot's clock (`docs/src/reference/robot-link.md`, § Robot to PC).
+const CLOCK_STEP: Span = Span::from_millis(1);
+/// How much faster a robot's clock may run than the PC's, as a fraction. Derived: twice the 100 ppm of
+/// a cheap quartz.
+const CLOCK_DRIFT: f64 = 2e-4;
+
 /// Compares each report with the one before it on the same connection, while bead is laid.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReportMonitor {
     last: Option<UsedReport>,
+    /// How much later than the fastest reports the last one has arrived.
+    delay: Span,
 }
 
 /// The last report that was used.
@@ -39,7 +50,7 @@ struct Moment {
 impl ReportMonitor {
     /// A new connection: nothing is compared with what was reported before.
     pub fn reset(&mut self) {
-        self.last = None;
+        *self = Self::default();
     }
 
     /// Time since the last report that could be used, where this one cannot: the robot's clock
@@ -48,6 +59,20 @@ impl ReportMonitor {
         let last = self.last_in_print(report)?;
         let (before, after) = last.moment.robot_ms.zip(report.robot_time_ms)?;
         (after <= before).then(|| now - last.moment.arrived)
+    }
+
+    /// When a report was made, on the PC's clock and but for the delay of the fastest reports: when it
+    /// arrived, unless the robot's clock says that it was on the way for longer than others.
+    pub fn made_at(&mut self, now: Stamp, report: &RobotState) -> Stamp {
+        let passed = self.last.and_then(|last| {
+            let on_robot = report.robot_time_ms?.checked_sub(last.moment.robot_ms?)?;
+            Some((now - last.moment.arrived, Span::from_millis(i64::try_from(on_robot).ok()?)))
+        });
+        let delay = passed.map_or(Span::ZERO, |(here, on_robot)| {
+            self.delay + here - on_robot - Span::from_secs(CLOCK_DRIFT * here.secs())
+        });
+        self.delay = if delay > MAX_DELAY { Span::ZERO } else { delay.max(Span::ZERO) };
+        now - (self.delay - CLOCK_STEP).max(Span::ZERO)
     }
 
     /// Takes a report. Returns the growth of the path where that is more than a robot with
@@ -81,5 +106,61 @@ impl Moment {
             Span::from_millis(i64::try_from(to.saturating_sub(from)).unwrap_or(i64::MAX))
         });
         on_robot.map_or(arrived, |span| span.max(arrived))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By how much later than it was made the last of some reports is taken to be made \[ms\]. Reports
+    /// are made every 20 ms of the PC's clock; the robot's runs at a rate, and each arrives late.
+    fn taken_late_ms(robot_rate: f64, late_ms: &[f64]) -> f64 {
+        let mut monitor = ReportMonitor::default();
+        let mut taken = 0.0;
+        for (number, late) in (1_u32..).zip(late_ms) {
+            let made_s = 0.02 * f64::from(number);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
+            let robot_ms = 5000 + (1e3 * robot_rate * made_s) as u64;
+            let report = RobotState {
+                robot_time_ms: Some(robot_ms),
+                has_setpoint: true,
+                mode: RobotMode::Print,
+                speed_mm_per_s: MmPerS::constant(100.0),
+                path_mm: Mm::constant(100.0 * made_s),
+                z_mm: Mm::ZERO,
+            };
+            let now = Stamp::from_secs(made_s + 1e-3 * late);
+            taken = 1e3 * (monitor.made_at(now, &report).secs() - made_s);
+            let _ = monitor.path_jump(now, &report, MmPerS::constant(150.0));
+        }
+        taken
+    }
+
+    #[test]
+    fn a_report_that_is_on_the_way_for_longer_is_dated_back_to_the_step_of_its_clock() {
+        assert!((taken_late_ms(1.0, &[0.4; 50]) - 0.4).abs() < 0.01);
+        for late in [3.0, 12.0, 25.0] {
+            let mut late_ms = [0.4; 50];
+            late_ms[49] = late;
+            let taken = taken_late_ms(1.0, &late_ms);
+            assert!((0.0..=2.0).contains(&taken), "{late} ms: {taken}");
+        }
+    }
+
+    #[test]
+    fn without_a_faster_report_or_after_a_long_delay_it_is_the_arrival_that_counts() {
+        assert!((taken_late_ms(1.0, &[3.0; 50]) - 3.0).abs() < 1.1);
+        assert!((taken_late_ms(1.0, &[0.4, 0.4, 90.0]) - 90.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_clock_that_is_too_slow_or_too_fast_by_a_hundredth_is_believed_for_no_more_than_its_delay()
+    {
+        for rate in [0.99, 0.9999, 1.0001, 1.01] {
+            let taken = taken_late_ms(rate, &[0.4; 1000]);
+            assert!((-30.0..=0.41).contains(&taken), "{rate}: {taken}");
+        }
+        assert!((taken_late_ms(0.9999, &[0.4; 1000]) - 0.4).abs() < 1.0);
     }
 }

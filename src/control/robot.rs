@@ -27,12 +27,19 @@ impl Controller {
             return;
         }
         let robot = &mut self.robot;
-        let state = &robot.odometer.correct(now, state);
+        let at = robot.reports.made_at(now, state);
+        let had_path = !robot.odometer.reports_no_path();
+        let state = &robot.odometer.correct(at, state);
+        let is_now_estimated = had_path && robot.odometer.reports_no_path();
         let jump = robot.reports.path_jump(now, state, self.setup.limits.max_speed);
-        if jump.is_some() {
+        if jump.is_some() || is_now_estimated {
             robot.path.clear();
         }
-        robot.path.observe(now, state);
+        // It begins with a step: all that was driven since the reported path has stood.
+        if is_now_estimated && let Some(watch) = &mut self.watch {
+            watch.begin_bead();
+        }
+        robot.path.observe(at, state);
         robot.state = Some(*state);
         robot.silent_since = None;
         // Compared across connections: the last bead may have ended while the link was down.
@@ -48,7 +55,7 @@ impl Controller {
                 if let Some(step) = jump {
                     self.path_jumped(now, state.path_mm, step);
                 }
-                self.printing(now, state, before);
+                self.printing(now, at, state, before);
             }
             RobotMode::Hold => {
                 self.robot.speed_monitor.reset();
@@ -91,7 +98,7 @@ impl Controller {
         }
     }
 
-    fn printing(&mut self, now: Stamp, state: &RobotState, before: Option<Mm>) {
+    fn printing(&mut self, now: Stamp, at: Stamp, state: &RobotState, before: Option<Mm>) {
         // The extruder side continues where the robot was not idle between two beads: the
         // pump did not stop, and its state is still valid. A fault stays until the robot is
         // idle.
@@ -103,7 +110,7 @@ impl Controller {
         }
         self.bead.laid = state.path_mm - self.bead.start;
         let (path, speed) = (state.path_mm, state.speed_mm_per_s);
-        let report = BeadReport { at: now, path, speed, flow_ratio: self.flow_ratio(now) };
+        let report = BeadReport { at, path, speed, flow_ratio: self.flow_ratio(now) };
         if self.robot.odometer.reports_no_path() {
             self.width.path_is_estimated();
         }
@@ -162,6 +169,10 @@ impl Controller {
         self.robot.link_up = true;
         self.robot.state = None;
         self.robot.reports.reset();
+        // What was laid meanwhile was laid at speeds that are not known.
+        if let Some(watch) = &mut self.watch {
+            watch.begin_bead();
+        }
         let limits = self.setup.limits;
         if limits.min_speed < robot.min_mm_per_s || limits.max_speed > robot.max_mm_per_s {
             self.phase.end(Hold::RobotLimits);
