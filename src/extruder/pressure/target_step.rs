@@ -115,6 +115,7 @@ impl TargetStep {
         self.must_answer =
             moved > MIN_ASKED_SIGMAS * answer.sigma && answered.abs() < STANDS_STILL * moved;
         let confirmed = answered.clamp(moved_late.min(moved), moved.max(moved_late));
+        // A pressure that moves already may do so with twice the gain.
         let lateness = if self.must_answer { answer.lateness } else { 1.0 };
         let largest_gain = LARGEST_GAIN / lateness.clamp(1.0, LARGEST_GAIN);
         let farthest = (confirmed + (to_go + OVERSHOOT_UNSEEN * size) / largest_gain).min(size);
