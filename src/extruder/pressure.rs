@@ -22,6 +22,7 @@ pub mod kalman;
 pub mod load;
 pub mod load_step;
 pub mod pi;
+pub mod plant_model;
 pub mod predictive;
 pub mod reference;
 pub mod residual;

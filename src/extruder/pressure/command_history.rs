@@ -42,13 +42,14 @@ impl CommandHistory {
     pub fn new(model: &Fopdt, back_s: f64, speed_rpm: f64) -> Self {
         let capacity = (back_s.clamp(0.0, 1e3) * MAX_COMMANDS_PER_S).ceil() as usize + 2;
         let entries = VecDeque::with_capacity(capacity);
-        let mut history = Self { gain: model.gain(), lag_s: model.lag_s(), entries, capacity };
-        history.restart(speed_rpm);
+        let mut history = Self { gain: 0.0, lag_s: 0.0, entries, capacity };
+        history.restart(model, speed_rpm);
         history
     }
 
-    /// As if `speed_rpm` had always been commanded.
-    pub fn restart(&mut self, speed_rpm: f64) {
+    /// As if `speed_rpm` had always been commanded to this model.
+    pub fn restart(&mut self, model: &Fopdt, speed_rpm: f64) {
+        (self.gain, self.lag_s) = (model.gain(), model.lag_s());
         let drive = self.gain * speed_rpm;
         self.entries.clear();
         self.entries.push_back(Entry { at_s: f64::NEG_INFINITY, drive, pressure: drive });

@@ -61,6 +61,11 @@ impl Load {
         self.average -= settled;
     }
 
+    /// The model's pressure has changed by a difference \[MPa\].
+    pub fn shift(&mut self, by: f64) {
+        self.average -= by;
+    }
+
     /// Looks for a step of the load in the residual of a reading, `dt_s` after the last, with a
     /// standard deviation \[MPa\]. Takes it up; returns by how much the load now has changed
     /// \[MPa\].

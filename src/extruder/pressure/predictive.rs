@@ -4,7 +4,8 @@
 //! model costs little more than with PI control (`docs/src/explanation/pressure-control.md`).
 //!
 //! - A step of the target goes only part of the way until the pressure has answered
-//!   ([`super::target_step`]).
+//!   ([`super::target_step`]). The answer shows the plant's gain, lag and dead time, and the rest of
+//!   the way is gone with these ([`super::plant_model`]).
 //! - A step of the load is answered at once by the model ([`super::load`]); a second one not before
 //!   the feedback has had its time, so that a wrong gain does not make it swing.
 //! - While nothing has stepped, an error within the noise is corrected in part: the screw stays quiet.
@@ -15,6 +16,7 @@
 use super::call_times::{CallTimes, InitialState, bounded};
 use super::command_history::CommandHistory;
 use super::load::Load;
+use super::plant_model::PlantModel;
 use super::residual::Residual;
 use super::target_step::{Answer, TargetStep};
 use super::tuning::Tuning;
@@ -31,9 +33,9 @@ const PENDING_FRACTION: f64 = 0.4;
 const QUIET_FRACTION: f64 = 0.3;
 /// Integral time within the quiet error \[s\]: the longer period of the drift of papers.md, "002".
 const QUIET_INTEGRAL_S: f64 = 60.0;
-/// Time for which a step of the target is bounded, in dead times and lags together. Derived: by then
-/// 63 % of an answer has arrived.
-const BOUNDED_FOR: f64 = 1.0;
+/// Time since its first answer for which a step of the target goes on, in dead times and lags
+/// together. Derived: by then what the answer has changed shows by 63 %.
+const ANSWERED_FOR: f64 = 1.0;
 /// Time in which a pressure answers a step of its target, in dead times and lags together. Derived:
 /// 98 % of the answer of a plant that is twice as slow as the model.
 const ANSWER_WITHIN: f64 = 5.0;
@@ -45,19 +47,20 @@ const MIN_ANSWER_S: f64 = 1.0;
 /// Longest time between two commands that counts \[s\]. Derived: twenty periods of Ma et al. 2026;
 /// a longer one is a stall.
 const MAX_PERIOD_S: f64 = 1.0;
-/// Dead times that are looked back. Derived: twice that of the model, and some.
-const LOOK_BACK: f64 = 2.5;
+/// Dead times that are looked back. Derived: twice the longest that an answer can show, and some.
+const LOOK_BACK: f64 = 5.0;
 
 /// The controller with its state. Pressures are in MPa, and what the screw is commanded is in MPa of
 /// the steady state that the model gives for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PredictiveController {
-    model: Fopdt,
+    /// The model, and all commands.
+    plant: PlantModel,
     tuning: Tuning,
+    /// Largest proportional gain but during a step \[rpm/MPa\].
+    rest_proportional: f64,
     limits: CommandLimits,
     calls: CallTimes,
-    /// All commands.
-    commanded: CommandHistory,
     /// The part of the feedback in them.
     fed_back: CommandHistory,
     residual: Residual,
@@ -84,11 +87,11 @@ impl PredictiveController {
         let (speed, pressure) = (running.speed.get(), running.pressure.get());
         let look_back_s = LOOK_BACK * model.dead_time_s() + tuning.periods.filter_delay_s();
         Self {
-            model,
+            plant: PlantModel::new(model, look_back_s, speed),
             tuning,
+            rest_proportional: tuning.proportional / model.gain(),
             limits,
             calls: CallTimes::new(running.speed),
-            commanded: CommandHistory::new(&model, look_back_s, speed),
             fed_back: CommandHistory::new(&model, look_back_s, 0.0),
             residual: Residual::new(tuning.sigma),
             load: Load::new(pressure - model.gain() * speed, model.lag_s(), tuning.sigma),
@@ -107,23 +110,24 @@ impl PredictiveController {
     /// leaves it out.
     pub fn resume(&mut self, now: Stamp, applied: Rpm) {
         self.calls.resume(now, applied);
-        self.commanded.push(now.secs(), applied.get());
+        self.plant.push(now.secs(), applied.get());
     }
 
     fn span_s(&self) -> f64 {
-        self.model.dead_time_s() + self.model.lag_s()
+        self.plant.model().dead_time_s() + self.plant.model().lag_s()
     }
 
     /// The pressure that the feedforward alone gives a dead time after a moment \[s\].
     fn by_feedforward(&self, at_s: f64, load: f64) -> f64 {
-        self.commanded.pressure_at(at_s) - self.fed_back.pressure_at(at_s) + load
+        self.plant.pressure_at(at_s) - self.fed_back.pressure_at(at_s) + load
     }
 
     /// Begins, goes on with or ends a step of the target.
     fn follow_target(&mut self, now_s: f64, target: f64) {
         let last = std::mem::replace(&mut self.target, target);
         if (target - last).abs() > self.tuning.target_step {
-            let goes_on = |step: &TargetStep| !step.has_answered() && step.goes_on_to(target, last);
+            let goes_on =
+                |step: &TargetStep| step.answered_s.is_none() && step.goes_on_to(target, last);
             if !self.step.as_ref().is_some_and(goes_on) {
                 self.begin_step(now_s);
             }
@@ -131,10 +135,9 @@ impl PredictiveController {
         }
         let is_over = |step: TargetStep| {
             let lasts_s = now_s - step.began_s;
-            if step.has_answered() {
-                lasts_s > BOUNDED_FOR * self.span_s()
-            } else {
-                lasts_s > self.answers_within_s() && step.unanswered_s(now_s).is_none()
+            match step.answered_s {
+                Some(answered_s) => now_s - answered_s > ANSWERED_FOR * self.span_s(),
+                None => lasts_s > self.answers_within_s() && step.unanswered_s(now_s).is_none(),
             }
         };
         if self.step.is_some_and(is_over) {
@@ -153,32 +156,57 @@ impl PredictiveController {
         self.load.add(-fed_back);
         self.residual.shift(-fed_back);
         self.integral -= fed_back;
-        self.fed_back.restart(0.0);
-        let commanded = self.commanded.pressure_at(now_s);
-        let expected = commanded + self.load.ahead(self.model.dead_time_s());
+        self.fed_back.restart(&self.plant.model(), 0.0);
+        let commanded = self.plant.pressure_at(now_s);
+        let expected = commanded + self.load.ahead(self.plant.model().dead_time_s());
         let measured = expected + self.load.average();
         self.step = Some(TargetStep::new(now_s, expected, commanded, measured));
+        self.plant.begin_step(now_s);
+    }
+
+    /// Uses the model that the answer to a step has shown. What the feedback has done until now
+    /// belongs to that model's feedforward.
+    fn adapt(&mut self, now_s: f64) {
+        let Some(step) = &mut self.step else { return };
+        let Some(likeliest) = self.plant.likeliest() else { return };
+        step.answered_s.get_or_insert(now_s);
+        let (before, arrived) = (self.plant.before_step(), self.plant.arrived(now_s));
+        if !self.plant.adopt(likeliest) {
+            return;
+        }
+        // The pressure before the step stays, so that another gain changes the load.
+        let load = before - self.plant.before_step();
+        let change = self.plant.arrived(now_s) - arrived;
+        self.load.add(load);
+        self.load.shift(change);
+        self.residual.shift(load + change);
+        let model = self.plant.model();
+        self.fed_back.restart(&model, 0.0);
+        self.integral = 0.0;
+        self.tuning.proportional = Tuning::proportional(&model, self.tuning.periods);
     }
 
     /// What the feedback adds \[MPa\], `dt_s` after the last command.
     fn feedback(&mut self, now_s: f64, dt_s: f64) -> f64 {
         let now = self.fed_back.pressure_at(now_s);
-        let then = self.fed_back.pressure_at(now_s - self.model.dead_time_s());
+        let model = self.plant.model();
+        let then = self.fed_back.pressure_at(now_s - model.dead_time_s());
         let error = -self.residual.filtered() - then - PENDING_FRACTION * (now - then);
         if error.abs() > self.tuning.quiet_error && now_s > self.awake_until_s {
             self.awake_until_s = now_s + self.tuning.awake_s;
         }
-        let Tuning { proportional, integral_s, .. } = self.tuning;
+        let Tuning { mut proportional, integral_s, .. } = self.tuning;
+        if self.step.is_none() {
+            // More would let the noise move the screw farther than with the given model.
+            proportional = proportional.min(self.rest_proportional * model.gain());
+        }
         let (gain, rate) = if now_s < self.awake_until_s {
             (proportional, proportional / integral_s)
         } else {
             (QUIET_FRACTION * proportional, 1.0 / QUIET_INTEGRAL_S)
         };
-        // Before an answer an error in the direction of the step says nothing yet.
-        let waits = self
-            .step
-            .is_some_and(|step| !step.has_answered() && step.sign(self.target) * error > 0.0);
-        if !waits {
+        // During a step an error may be the model's, which the answer mends.
+        if self.step.is_none() {
             self.integral = bounded(self.integral + rate * error * dt_s.min(MAX_PERIOD_S));
         }
         gain * error + self.integral
@@ -189,10 +217,10 @@ impl PredictiveController {
     /// changes anything, after a time h, the pressure goes on by d·h/τ from a drive that is d beyond
     /// it, and by d²/(2·r·τ) while the drive falls at a rate r.
     fn drive(&self, from: f64, to: f64) -> f64 {
-        let kept = libm::exp(-self.period_s / self.model.lag_s());
-        let rate = self.model.gain() * self.limits.rate_per_s();
-        let (wait_s, falls_s2) =
-            (self.period_s, 2.0 * self.model.lag_s() * (to - from).abs() / rate);
+        let model = self.plant.model();
+        let kept = libm::exp(-self.period_s / model.lag_s());
+        let rate = model.gain() * self.limits.rate_per_s();
+        let (wait_s, falls_s2) = (self.period_s, 2.0 * model.lag_s() * (to - from).abs() / rate);
         let beyond = rate * ((wait_s * wait_s + falls_s2).sqrt() - wait_s);
         let sign = (to - from).signum();
         let at_once = (to - kept * from) / (1.0 - kept);
@@ -202,7 +230,7 @@ impl PredictiveController {
     /// What the feedforward commands \[MPa\]: it takes the pressure to the target at once after a step,
     /// and along the reference else.
     fn feedforward(&self, now_s: f64) -> f64 {
-        let dead_s = self.model.dead_time_s();
+        let dead_s = self.plant.model().dead_time_s();
         let load = self.load.ahead(dead_s);
         let from = self.by_feedforward(now_s, load);
         let at_once = self.step.is_some() || self.load_stepped;
@@ -214,20 +242,22 @@ impl PredictiveController {
 
     /// The drive \[MPa\] within what a step of the target allows.
     fn within_step(&mut self, now_s: f64, drive: f64) -> f64 {
-        let Some(mut step) = self.step else { return drive };
-        let dead_s = self.model.dead_time_s();
+        let Some(mut step) = self.step.filter(|step| step.answered_s.is_none()) else {
+            return drive;
+        };
+        let dead_s = self.plant.model().dead_time_s();
         let delay_s = self.tuning.periods.filter_delay_s();
-        let arrived = self.commanded.pressure_at(now_s - dead_s - delay_s);
+        let arrived = self.plant.arrived(now_s - delay_s);
         let answer = Answer {
             arrived,
-            arrived_late: self.commanded.pressure_at(now_s - 2.0 * dead_s - delay_s),
+            arrived_late: self.plant.arrived(now_s - dead_s - delay_s),
             measured: arrived + self.load.now() + self.residual.filtered(),
             sigma: self.residual.sigma(),
-            is_due: now_s - step.began_s >= dead_s + delay_s,
+            lateness: (now_s - step.began_s) / (dead_s + delay_s),
         };
         let bound = step.bound(now_s, self.target, &answer);
         self.step = Some(step);
-        let farthest = self.drive(self.commanded.pressure_at(now_s), bound);
+        let farthest = self.drive(self.plant.pressure_at(now_s), bound);
         let sign = step.sign(self.target);
         sign * (sign * drive).min(sign * farthest)
     }
@@ -237,13 +267,17 @@ impl PressureController for PredictiveController {
     fn measured(&mut self, now: Stamp, pressure: MPa) -> Result<(), ReadingRefused> {
         let dt_s = self.calls.read(now, pressure)?;
         self.load.advance(dt_s);
-        let arrived = self.commanded.pressure_at(now.secs() - self.model.dead_time_s());
+        let arrived = self.plant.arrived(now.secs());
         let residual = pressure.get() - arrived - self.load.now();
         self.unused_s += dt_s;
         if !self.residual.update(residual) {
             return Ok(());
         }
         let since_s = std::mem::take(&mut self.unused_s);
+        if let Some(step) = &self.step {
+            let (by, size) = (pressure.get() - step.measured_before(), step.size(self.target));
+            self.plant.answered(now.secs(), by, self.residual.sigma(), size);
+        }
         if now.secs() < self.awake_until_s {
             self.load.follow(residual);
         } else if let Some(shown) = self.load.detect(residual, self.residual.sigma(), since_s) {
@@ -258,23 +292,25 @@ impl PressureController for PredictiveController {
         let Some(dt_s) = self.calls.begin(now) else { return self.calls.last_command() };
         if dt_s > 0.0 {
             self.period_s = dt_s.clamp(1e-4, MAX_PERIOD_S);
-            self.takeover_offset *= libm::exp(-dt_s / self.model.lag_s());
+            self.takeover_offset *= libm::exp(-dt_s / self.plant.model().lag_s());
         }
         let now_s = now.secs();
         self.follow_target(now_s, target.get() - self.takeover_offset);
+        self.adapt(now_s);
         let feedback = self.feedback(now_s, dt_s);
         let drive = self.feedforward(now_s) + feedback;
         let drive = self.within_step(now_s, drive);
         self.load_stepped = false;
-        let command = self.calls.command(&self.limits, drive / self.model.gain(), dt_s);
-        self.commanded.push(now_s, command.speed.get());
-        self.fed_back.push(now_s, feedback / self.model.gain());
+        let gain = self.plant.model().gain();
+        let command = self.calls.command(&self.limits, drive / gain, dt_s);
+        self.plant.push(now_s, command.speed.get());
+        self.fed_back.push(now_s, feedback / gain);
         command
     }
 
     fn settle(&mut self, now: Stamp, applied: Rpm) {
         self.calls.settle(applied);
-        self.commanded.push(now.secs(), applied.get());
+        self.plant.push(now.secs(), applied.get());
     }
 
     fn is_unanswered(&self, now: Stamp) -> bool {
@@ -287,6 +323,6 @@ impl PressureController for PredictiveController {
 
     fn preview(&self) -> Span {
         let kept = libm::exp(-self.period_s / self.tuning.reference_s);
-        Span::from_secs(self.model.dead_time_s() + self.period_s / (1.0 - kept))
+        Span::from_secs(self.plant.model().dead_time_s() + self.period_s / (1.0 - kept))
     }
 }

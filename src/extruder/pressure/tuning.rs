@@ -62,11 +62,17 @@ pub struct Tuning {
 }
 
 impl Tuning {
+    /// Proportional gain for each unit of a model's gain, by its rule.
+    pub fn proportional(model: &Fopdt, periods: LoopPeriods) -> f64 {
+        let (lag, dead) = (model.lag_s(), model.dead_time_s());
+        0.93 * lag / (dead + periods.sampling_s()).max(0.25 * lag)
+    }
+
     /// By the rules.
     pub fn of(model: &Fopdt, noise: &PressureNoise, periods: LoopPeriods) -> Self {
         let (lag, dead) = (model.lag_s(), model.dead_time_s());
         let sigma = noise.sigma().get();
-        let proportional = 0.93 * lag / (dead + periods.sampling_s()).max(0.25 * lag);
+        let proportional = Self::proportional(model, periods);
         let integral_s = (0.95 * lag).max(2.0 * periods.sampling_s());
         Self {
             proportional,
