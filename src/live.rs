@@ -170,9 +170,11 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         live.clock,
     )?;
     let logger = RunLogger::start(live.log)?;
+    let counts_pulses = matches!(live.run.counted_pulses(), Some(Ok(_)));
     let watch = live.extruder.as_ref().map(|side| {
         let driver = Arc::clone(&side.driver);
         ExtruderWatch::new(driver, side.range(), side.setup.feedforward_period)
+            .counting_pulses(counts_pulses)
     });
     let mut controller = Controller::new(live.cell.controller_setup(&live.run, &live.calibration));
     if let Some(side) = live.extruder {

@@ -17,13 +17,20 @@ pub struct ExtruderWatch {
     /// Reasons of refusals that were shown to the operator.
     refused: Vec<RefusalReason>,
     pump: Option<PumpMode>,
+    /// Whether its reports must have an rpm, and none that misses it was shown yet.
+    needs_rpm: bool,
 }
 
 impl ExtruderWatch {
     /// For an extruder without a report yet; `period` is the time between steps of its side.
     pub fn new(driver: Arc<dyn ExtruderDriver>, range: DriveRange, period: Span) -> Self {
         let (shown, refused) = (ExtruderState::Off, Vec::new());
-        Self { driver, range, period, shown, refused, pump: None }
+        Self { driver, range, period, shown, refused, pump: None, needs_rpm: false }
+    }
+
+    /// The pulses of its screw are counted, where `counts`.
+    pub fn counting_pulses(self, counts: bool) -> Self {
+        Self { needs_rpm: counts, ..self }
     }
 
     /// Why the cell cannot command an extruder; `None` if it can.
@@ -46,7 +53,13 @@ impl ExtruderWatch {
         match event {
             ExtruderEvent::State { state, .. } => {
                 self.pump = Some(state.pump);
-                None
+                let is_missed = state.pump == PumpMode::On && state.screw_rpm.is_none();
+                let is_new = is_missed && std::mem::take(&mut self.needs_rpm);
+                is_new.then(|| {
+                    "warning: the extruder reports no rpm, by which [extruder] pulses_per_turn \
+                     counts: no pulsation is cancelled"
+                        .to_owned()
+                })
             }
             ExtruderEvent::Up { limits, .. } => {
                 self.refused.clear();
