@@ -6,5 +6,6 @@ mod controller;
 pub mod drivers;
 pub mod extruder;
 pub mod file;
+pub mod pulses;
 
 pub use file::{CameraSettings, Cell, ImageSource, Mount, RecordingSettings, RobotSettings};

@@ -165,10 +165,12 @@ pub fn run(live: LiveRun) -> Result<LiveReport, LiveError> {
         live.clock,
     )?;
     let logger = RunLogger::start(live.log)?;
+    let counts_pulses = matches!(live.run.counted_pulses(), Some(Ok(_)));
     let watch = live.extruder.as_ref().map(|side| {
         let driver = Arc::clone(&side.driver);
         let as_received = Box::new(move |command| driver.as_received(command));
         ExtruderWatch::new(as_received, side.range(), side.setup.feedforward_period)
+            .counting_pulses(counts_pulses)
     });
     let mut controller = Controller::new(live.cell.controller_setup(&live.run, &live.calibration));
     if let Some(side) = live.extruder {

@@ -354,6 +354,41 @@ fn a_screw_that_was_weighed_needs_no_model() {
 }
 
 #[test]
+fn pulses_that_cannot_be_cancelled_are_named_by_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let warning = |changes: &[(&str, &str)]| {
+        let counted = ("layer_height_mm = 20.0", "layer_height_mm = 20.0\npulses_per_turn = 1.0");
+        let lag = ("start_delay_s = 0.1", "start_delay_s = 0.1\nscrew_lag_s = 0.2");
+        fs::write(
+            folder.path().join("cell.toml"),
+            changed(CELL, &[&[counted, lag], changes].concat()),
+        )
+        .unwrap();
+        let output = truebead(folder.path(), &["check", "cell.toml"]);
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(said.contains("ready for simulate"), "{said}");
+        let (_, after) = said.split_once("pulses_per_turn has no effect:")?;
+        Some(after.lines().nth(1).unwrap().trim().to_owned())
+    };
+    assert_eq!(warning(&[]), None);
+    let distance = "strategy = \"distance\"\nexponent = 0.25";
+    let pi = "strategy = \"pi\"\nkp_per_s = 0.75\nki_per_s2 = 0.6\nerror_unit_mm = 0.126582";
+    let ignored = format!("{distance}\npulsation = \"ignore\"");
+    let pulses = "pulses_per_turn = 1.0";
+    let fast = [("min_rpm = 0.0", "min_rpm = 40.0"), (pulses, "pulses_per_turn = 3.0")];
+    let cases: [(&[(&str, &str)], &str); 4] = [
+        (&[(distance, pi)], "only [control] strategy = \"distance\" cancels"),
+        (&[(distance, &ignored)], "[control] pulsation is \"ignore\""),
+        (&[(pulses, "pulses_per_turn = 0.06")], "after 11.1 s at every rpm"),
+        (&fast, "within 0.500 s at every rpm"),
+    ];
+    for (changes, reason) in cases {
+        let said = warning(changes).unwrap();
+        assert!(said.contains(reason), "{said}");
+    }
+}
+
+#[test]
 fn a_pressure_that_is_held_gives_the_flow_although_gain_and_load_change() {
     let cell = include_str!("../cells/extruder-pressure.toml");
     let held = runs_through(cell, &[], 0.06);

@@ -89,7 +89,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             about_robot(&loaded.devices);
             about_run(run);
             about_controller(&loaded, run);
-            about_extruder(&loaded, side.as_ref())?;
+            about_extruder(&loaded, run, side.as_ref())?;
         }
         Err(missing) => {
             say!("  not for run, simulate; missing:");
@@ -186,9 +186,12 @@ fn about_purposes(run: &RunPart, devices: &Devices) {
 }
 
 /// Prints the extruder side and its files.
-fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::Result<()> {
-    let part = loaded.cell.run.as_ref().and_then(|run| run.extruder.as_ref());
-    let Some(part) = part else { return Ok(()) };
+fn about_extruder(
+    loaded: &LoadedCell,
+    run: &RunPart,
+    side: Option<&ExtruderSide>,
+) -> anyhow::Result<()> {
+    let Some(part) = &run.extruder else { return Ok(()) };
     let (extruder, unit) = (&part.extruder, part.extruder.drive.unit_word());
     let (low, high) = extruder.limits.range();
     say!(
@@ -208,6 +211,9 @@ fn about_extruder(loaded: &LoadedCell, side: Option<&ExtruderSide>) -> anyhow::R
         && let Some(words) = range_warning(part, side)?
     {
         say!("  WARNING      {words}");
+    }
+    if let Some(Err(why)) = run.counted_pulses() {
+        say!("  WARNING      extruder.pulses_per_turn has no effect:\n               {why}");
     }
     if part.plant.is_some() {
         let _ = loaded.plant(part)?;

@@ -37,6 +37,7 @@ use flow_step::StepDetector;
 use outlier_run::OutlierRun;
 use pulsating_bead::PulsationSample;
 use pulsation::FlowPulsation;
+pub use pulsation::PERIODS_S;
 pub use pulse_counter::ScrewPulses;
 pub use sample::WidthReading;
 use sample::{GaugeInterval, MatchedWidth};

@@ -3,10 +3,11 @@
 
 mod autoregression;
 mod offset;
+mod plausible_offsets;
 mod response;
 
+use offset::OffsetTest;
 pub use offset::WrongOffset;
-use offset::{LARGEST_ERROR, OffsetTest};
 pub use response::NoResponse;
 use response::ResponseTest;
 
@@ -54,7 +55,7 @@ impl BeadWatch {
     /// Before the first report.
     pub fn new(settings: WatchSettings) -> Self {
         let WatchSettings { offset, gauge, reference_speed, roughness, .. } = settings;
-        let kept_mm = (1.0 + LARGEST_ERROR) * offset.get() + gauge.get();
+        let kept_mm = (1.0 + offset::LARGEST_ERROR) * offset.get() + gauge.get();
         let roughness = WidthNoise::new(roughness, gauge.get()).variance(f64::INFINITY);
         Self {
             offset,

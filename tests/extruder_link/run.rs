@@ -117,6 +117,23 @@ fn said(output: &Output) -> String {
 }
 
 #[test]
+fn pulses_that_are_counted_by_an_rpm_that_is_never_reported_are_named_once() {
+    let height = "layer_height_mm = 20.0";
+    let counted = format!("{height}\npulses_per_turn = 1.0");
+    let (cell, plant) = CELL.split_once("[extruder_plant]").unwrap();
+    let (plant, simulation) = plant.split_once("[simulation]").unwrap();
+    let cell = format!("{}[simulation]{simulation}", cell.replace(height, &counted));
+    let own = [
+        (counted.as_str(), height),
+        ("[simulation]", &format!("[extruder_plant]{plant}[simulation]")),
+    ];
+    let bench = Bench::new(&cell, &own, &[]);
+    let said = said(&wait(bench.start("3")));
+    assert!(said.contains("extruder running"), "{said}");
+    assert_eq!(said.matches("the extruder reports no rpm").count(), 1, "{said}");
+}
+
+#[test]
 fn robot_and_extruder_run_together_and_the_recording_replays() {
     let bench = Bench::new(CELL, &[], &[]);
     let output = wait(bench.start("5"));

@@ -16,6 +16,8 @@ pub struct ExtruderWatch {
     /// Reasons of refusals that were shown to the operator.
     refused: Vec<RefusalReason>,
     pump: Option<PumpMode>,
+    /// Whether its reports must have an rpm, and none that misses it was shown yet.
+    needs_rpm: bool,
 }
 
 impl ExtruderWatch {
@@ -27,7 +29,12 @@ impl ExtruderWatch {
         period: Span,
     ) -> Self {
         let (shown, refused) = (ExtruderState::Off, Vec::new());
-        Self { as_received, range, period, shown, refused, pump: None }
+        Self { as_received, range, period, shown, refused, pump: None, needs_rpm: false }
+    }
+
+    /// The pulses of its screw are counted, where `counts`.
+    pub fn counting_pulses(self, counts: bool) -> Self {
+        Self { needs_rpm: counts, ..self }
     }
 
     /// Why the cell cannot command an extruder; `None` if it can.
@@ -50,7 +57,13 @@ impl ExtruderWatch {
         match event {
             ExtruderEvent::State { state, .. } => {
                 self.pump = Some(state.pump);
-                None
+                let is_missed = state.pump == PumpMode::On && state.screw_rpm.is_none();
+                let is_new = is_missed && std::mem::take(&mut self.needs_rpm);
+                is_new.then(|| {
+                    "warning: the extruder reports no rpm, by which [extruder] pulses_per_turn \
+                     counts: no pulsation is cancelled"
+                        .to_owned()
+                })
             }
             ExtruderEvent::Up { limits, .. } => {
                 self.refused.clear();

@@ -12,7 +12,7 @@ use crate::core::Rpm;
 
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
 /// followed as drift.
-const PERIODS_S: (f64, f64) = (0.55, 10.0);
+pub const PERIODS_S: (f64, f64) = (0.55, 10.0);
 /// Periods in an octave. Derived: over 10 periods a harmonic that is off by half a step, 1 %, loses a
 /// tenth of a period.
 const PERIODS_IN_OCTAVE: u8 = 35;

@@ -18,6 +18,13 @@ pub struct ScrewPulses {
     pub valid: Span,
 }
 
+impl ScrewPulses {
+    /// Frequency of the pulses \[Hz\].
+    pub fn hz(&self, speed: Rpm) -> f64 {
+        speed.get() * self.per_turn / 60.0
+    }
+}
+
 /// Pulses since the reports began. A changing speed changes the frequency and keeps the phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseCounter {
@@ -44,7 +51,7 @@ impl PulseCounter {
     /// Adds a report. Returns whether the count goes on: after a gap, and after a frequency that is not
     /// counted, it begins anew.
     pub fn report(&mut self, at_s: f64, speed: Rpm) -> bool {
-        let hz = speed.get() * self.screw.per_turn / 60.0;
+        let hz = self.screw.hz(speed);
         let is_counted = self.counted_hz.contains(&hz);
         let before = self.newest().filter(|last| is_counted && self.is_valid(last, at_s));
         if before.is_none() {

@@ -9,6 +9,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::plausible_offsets::{LARGEST_ERROR, MatchedWidth, PlausibleOffsets};
 use crate::core::{Mm, MmPerS};
 use crate::numeric::rank;
 use crate::width_control::distance::WidthReading;
@@ -21,9 +22,6 @@ const WEAKEST_EXPONENT: f64 = 0.175;
 /// Exponents with which the flow is derived from width and speed; the one that leaves the steadiest
 /// flow counts.
 const EXPONENTS: [f64; 5] = [0.15, 0.25, 0.4, 0.65, 1.0];
-/// Error of the offset for which an answer may come sooner or later, as a fraction of it. Derived: two
-/// standard deviations where the cell states none.
-const OFFSET_ERROR: f64 = 0.2;
 /// By how many times more than usual the flow must have changed. A smaller value finds a missing
 /// answer sooner, and takes a flow that cancels the speed for one more often.
 const MIN_CHANGES: f64 = 6.0;
@@ -62,15 +60,8 @@ pub struct ResponseTest {
     widths: VecDeque<MatchedWidth>,
     /// Changes over that path, of all bead that says how much the flow usually changes.
     changes: VecDeque<Change>,
-}
-
-/// A width with the speed at which that bead was laid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct MatchedWidth {
-    position_mm: f64,
-    ln_width: f64,
-    /// Mean of ln v over the gauge, where the cell says that it is and at either end of its error.
-    ln_speeds: [f64; 3],
+    /// Where the camera may look, by the bead before that path.
+    offsets: PlausibleOffsets,
 }
 
 /// Change of ln w and of ln v from one width to another.
@@ -87,13 +78,15 @@ impl ResponseTest {
     pub fn new(offset: Mm, gauge: Mm, roughness: f64) -> Self {
         let (offset_mm, gauge_mm) = (offset.get(), gauge.get());
         let (widths, changes) = (VecDeque::new(), VecDeque::new());
-        Self { offset_mm, gauge_mm, roughness, widths, changes }
+        let offsets = PlausibleOffsets::new(offset_mm, gauge_mm, roughness);
+        Self { offset_mm, gauge_mm, roughness, widths, changes, offsets }
     }
 
     /// A new bead, or one that goes on elsewhere.
     pub fn begin_bead(&mut self) {
         self.widths.clear();
         self.changes.clear();
+        self.offsets.clear();
     }
 
     /// A width of the bead about a position, by the stated offset, and its target. Returns the change
@@ -108,7 +101,7 @@ impl ResponseTest {
         if target <= Mm::ZERO {
             return None;
         }
-        let newest = self.matched(speeds, position_mm, reading.width)?;
+        let newest = self.offsets.matched(speeds, position_mm, reading.width)?;
         let before = self.widths.back().map(|last| last.position_mm);
         if before.is_some_and(|before| before >= newest.position_mm) {
             return None;
@@ -124,11 +117,12 @@ impl ResponseTest {
         }
         let oldest = oldest?;
         self.widths.push_front(oldest);
+        self.offsets.add(&oldest);
         let found = self.compare(&oldest, &newest, reading, target).map(|over_mm| NoResponse {
-            speed_change: libm::expm1(newest.ln_speeds[0] - oldest.ln_speeds[0]),
+            speed_change: libm::expm1(newest.ln_speed() - oldest.ln_speed()),
             width_change: libm::expm1(newest.ln_width - oldest.ln_width),
             over_mm,
-            speed_before: speeds.speed_of(oldest.ln_speeds[0]),
+            speed_before: speeds.speed_of(oldest.ln_speed()),
         });
         self.remember(&oldest, &newest);
         found
@@ -137,22 +131,13 @@ impl ResponseTest {
     /// Path within which a change of the speed is seen whole, wherever the camera looks within its
     /// error \[mm\].
     fn span_mm(&self) -> f64 {
-        2.0 * OFFSET_ERROR * self.offset_mm + self.gauge_mm
-    }
-
-    fn matched(&self, speeds: &SpeedHistory, position_mm: f64, width: Mm) -> Option<MatchedWidth> {
-        let half = 0.5 * self.gauge_mm;
-        let shift = OFFSET_ERROR * self.offset_mm;
-        let at = |by: f64| speeds.mean_near(position_mm + by - half, position_mm + by + half);
-        let known = speeds.mean_over(position_mm - half, position_mm + half)?;
-        let ln_speeds = [known.mean, at(shift)?.mean, at(-shift)?.mean];
-        Some(MatchedWidth { position_mm, ln_width: libm::log(width.get()), ln_speeds })
+        2.0 * LARGEST_ERROR * self.offset_mm + self.gauge_mm
     }
 
     fn remember(&mut self, oldest: &MatchedWidth, newest: &MatchedWidth) {
         let position_mm = newest.position_mm;
         let width = newest.ln_width - oldest.ln_width;
-        let speed = newest.ln_speeds[0] - oldest.ln_speeds[0];
+        let speed = newest.ln_speed() - oldest.ln_speed();
         self.changes.push_back(Change { position_mm, width, speed });
         while self.changes.front().is_some_and(|one| position_mm - one.position_mm > USUAL_OVER_MM)
         {
@@ -183,7 +168,7 @@ impl ResponseTest {
         reading: WidthReading,
         target: Mm,
     ) -> Option<f64> {
-        let change = newest.speed_change(oldest);
+        let change = newest.speed_change(oldest, self.offsets.plausible());
         let measurement = reading.sigma / reading.width;
         let sigma = (self.roughness + measurement * measurement).sqrt();
         let widths = self.widths.iter().map(|one| one.ln_width);
@@ -202,15 +187,6 @@ impl ResponseTest {
     }
 }
 
-impl MatchedWidth {
-    /// Size of the change of ln v since an earlier width: the smallest, wherever the camera looks
-    /// within its error.
-    fn speed_change(&self, earlier: &Self) -> f64 {
-        let changes = self.ln_speeds.iter().zip(&earlier.ln_speeds).map(|(now, then)| now - then);
-        changes.map(f64::abs).fold(f64::INFINITY, f64::min)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,7 +200,7 @@ mod tests {
     const GAUGE_MM: f64 = 12.7;
     const FRAME_S: f64 = 0.02;
 
-    /// What the camera sees of a bead whose speed steps from 80 to 100 mm/s.
+    /// What the camera sees of a bead whose speed steps to 80 and then to 100 mm/s.
     #[derive(Debug, Clone, Copy)]
     struct Seen {
         /// Exponent of the bead that is seen; 0 for one that does not answer.
@@ -235,7 +211,12 @@ mod tests {
         wave: f64,
         /// Its width over the target, before the step.
         ratio: f64,
+        /// Speed of its beginning, which every bead answers \[mm/s\].
+        begins_at: f64,
     }
+
+    /// Path of the nozzle at the first step \[mm\].
+    const FIRST_MM: f64 = 300.0;
 
     /// Path of the nozzle at the step \[mm\].
     const STEP_MM: f64 = 900.0;
@@ -251,7 +232,11 @@ mod tests {
         });
         let (mut path, mut at) = (0.0, 0.0);
         while path < STEP_MM + 600.0 {
-            let speed = if path < STEP_MM { 80.0 } else { 100.0 };
+            let speed = match path {
+                ..FIRST_MM => seen.begins_at,
+                ..STEP_MM => 80.0,
+                _ => 100.0,
+            };
             (path, at) = (path + speed * FRAME_S, at + FRAME_S);
             test.reported(&BeadReport {
                 at: Stamp::from_secs(at),
@@ -260,18 +245,19 @@ mod tests {
                 flow_ratio: 1.0,
             });
             let middle = path - OFFSET_MM - seen.farther_mm;
-            let fraction = ((middle - STEP_MM) / GAUGE_MM + 0.5).clamp(0.0, 1.0);
-            let ln_speed = fraction * 1.25_f64.ln();
+            let before = |mm: f64| ((mm - middle) / GAUGE_MM + 0.5).clamp(0.0, 1.0);
+            let ln_speed = (1.0 - before(STEP_MM)) * 1.25_f64.ln();
+            let begin = 0.25 * before(FIRST_MM) * (seen.begins_at / 80.0).ln();
             let flow = seen.wave * (std::f64::consts::TAU * middle / 100.0).sin();
             let [rough, _] = hash::normal_pair(hash::mix(&[5, (middle / 8.0).floor().to_bits()]));
-            let ln_width = flow - seen.exponent * ln_speed + 0.0013 * rough;
+            let ln_width = flow - begin - seen.exponent * ln_speed + 0.0013 * rough;
             let reading = WidthReading {
                 width: Mm::constant(42.0 * seen.ratio * ln_width.exp()),
                 sigma: Mm::constant(0.003),
             };
             let found = test.measured(Mm::constant(path), reading, Mm::constant(42.0)).no_response;
             if let Some(found) = found {
-                assert!((found.speed_change - 0.25).abs() < 0.05, "{found:?}");
+                assert!((0.15..0.26).contains(&found.speed_change), "{found:?}");
                 assert!(found.width_change.abs() < 0.01, "{found:?}");
                 assert!((found.speed_before.get() - 80.0).abs() < 0.1, "{found:?}");
                 return Some(path - STEP_MM);
@@ -280,7 +266,8 @@ mod tests {
         None
     }
 
-    const ANSWERS: Seen = Seen { exponent: 0.25, farther_mm: 0.0, wave: 0.0, ratio: 1.05 };
+    const ANSWERS: Seen =
+        Seen { exponent: 0.25, farther_mm: 0.0, wave: 0.0, ratio: 1.05, begins_at: 80.0 };
 
     #[test]
     fn a_width_that_does_not_answer_is_noticed_within_the_offset_and_two_gauges() {
@@ -289,11 +276,24 @@ mod tests {
     }
 
     #[test]
+    fn a_bead_that_has_shown_where_the_camera_looks_is_waited_for_no_longer() {
+        let unknown = noticed_after(Seen { exponent: 0.0, ..ANSWERS }).unwrap();
+        let known = Seen { exponent: 0.0, begins_at: 110.0, ..ANSWERS };
+        let after = noticed_after(known).unwrap();
+        assert!(after <= OFFSET_MM + GAUGE_MM && after < unknown - 5.0, "{after} {unknown}");
+        // Where it is said to look makes no difference to that.
+        let farther = noticed_after(Seen { farther_mm: 12.0, ..known }).unwrap();
+        assert!((farther - 12.0 - after).abs() < 6.0, "{after} {farther}");
+    }
+
+    #[test]
     fn widths_that_answer_are_not_reported_whatever_the_exponent_and_the_error_of_the_offset() {
         for exponent in [0.175, 0.25, 0.5, 1.0] {
-            for farther_mm in [0.0, 17.0, -17.0] {
-                let seen = Seen { exponent, farther_mm, ..ANSWERS };
-                assert_eq!(noticed_after(seen), None, "{seen:?}");
+            for farther_mm in [0.0, 6.6, 17.0, -2.2, -17.0] {
+                for begins_at in [60.0, 80.0, 110.0] {
+                    let seen = Seen { exponent, farther_mm, begins_at, ..ANSWERS };
+                    assert_eq!(noticed_after(seen), None, "{seen:?}");
+                }
             }
         }
     }

@@ -1,0 +1,162 @@
+//! Where the camera may look, by the changes of the speed that the bead has shown.
+//!
+//! Where the speed has changed fast, the width has changed one offset later. Each error of the offset
+//! that is tried leaves a sum of squares of ln w + b·ln v, with the b that fits best; one that leaves
+//! much more than the best is excluded. A slow change tells nothing: a drift of the flow looks like it.
+
+use std::ops::Range;
+
+use crate::core::Mm;
+use crate::width_control::speed_history::SpeedHistory;
+
+/// Error of the offset up to which an answer may come sooner or later, as a fraction of it. Derived:
+/// two standard deviations where the cell states none.
+pub const LARGEST_ERROR: f64 = 0.2;
+/// Errors that are tried to either side of none. Derived: [`LARGEST_ERROR`] over [`STEP`].
+const STEPS: usize = 4;
+/// From one of them to the next. Derived: a quarter of the largest one, a third of a gauge of 12.7 mm that
+/// is 88.4 mm behind the nozzle.
+const STEP: f64 = 0.05;
+/// Errors that are tried, from the nearest place to the farthest.
+const TRIED: usize = 2 * STEPS + 1;
+/// Path from one width that is used to the next, as a fraction of the gauge. Derived: widths that are
+/// closer show the same bead.
+const SPACING_RATIO: f64 = 0.5;
+/// Difference of the changes of ln v, where the camera may look, from which on they are compared.
+/// Derived: half of a change after which a missing answer must be noticed.
+const MIN_DIFFERENCE: f64 = 0.05;
+/// Exponents that are possible. Derived: those of the test of the answer.
+const EXPONENTS: (f64, f64) = (0.15, 1.0);
+/// Log likelihood ratio to the best from which on an error is excluded. Derived: odds of three thousand.
+const EXCLUDED_FROM: f64 = 8.0;
+
+/// A width with the speeds at which that bead may have been laid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MatchedWidth {
+    /// Middle of the gauge by the stated offset \[mm\].
+    pub position_mm: f64,
+    /// ln w.
+    pub ln_width: f64,
+    /// Mean of ln v over the gauge, for each error of the offset.
+    ln_speeds: [f64; TRIED],
+}
+
+impl MatchedWidth {
+    /// Mean of ln v over the gauge by the stated offset.
+    pub fn ln_speed(&self) -> f64 {
+        self.ln_speeds[STEPS]
+    }
+
+    /// Size of the change of ln v since an earlier width: the smallest of a range of errors.
+    pub fn speed_change(&self, earlier: &Self, errors: Range<usize>) -> f64 {
+        let changes = self.ln_speeds.iter().zip(&earlier.ln_speeds).map(|(now, then)| now - then);
+        let plausible = changes.skip(errors.start).take(errors.len());
+        plausible.map(f64::abs).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The errors of the offset that this bead has not excluded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlausibleOffsets {
+    offset_mm: f64,
+    gauge_mm: f64,
+    /// Variance of ln w by the roughness over a gauge.
+    roughness: f64,
+    last: Option<MatchedWidth>,
+    /// Changes that are compared.
+    count: f64,
+    /// Their sum of squares of ln w.
+    width_squares: f64,
+    /// Their sums for each error.
+    sums: [Sums; TRIED],
+}
+
+/// Sums over changes from one width to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Sums {
+    /// Of ln w times ln v.
+    products: f64,
+    /// Of squares of ln v.
+    squares: f64,
+}
+
+impl PlausibleOffsets {
+    /// Before the first width: the camera's offset and the length of the gauge \[mm\], and the variance of
+    /// ln w by the roughness over it.
+    pub fn new(offset_mm: f64, gauge_mm: f64, roughness: f64) -> Self {
+        let sums = [Sums::default(); TRIED];
+        Self { offset_mm, gauge_mm, roughness, last: None, count: 0.0, width_squares: 0.0, sums }
+    }
+
+    /// A new bead.
+    pub fn clear(&mut self) {
+        *self = Self::new(self.offset_mm, self.gauge_mm, self.roughness);
+    }
+
+    /// A width about a position \[mm\], by the stated offset; `None` where no speed is known there.
+    pub fn matched(
+        &self,
+        speeds: &SpeedHistory,
+        position_mm: f64,
+        width: Mm,
+    ) -> Option<MatchedWidth> {
+        let half = 0.5 * self.gauge_mm;
+        let mut ln_speeds = [0.0; TRIED];
+        let mut laid_mm = position_mm + LARGEST_ERROR * self.offset_mm;
+        for ln_speed in &mut ln_speeds {
+            *ln_speed = speeds.mean_near(laid_mm - half, laid_mm + half)?.mean;
+            laid_mm -= STEP * self.offset_mm;
+        }
+        ln_speeds[STEPS] = speeds.mean_over(position_mm - half, position_mm + half)?.mean;
+        Some(MatchedWidth { position_mm, ln_width: libm::log(width.get()), ln_speeds })
+    }
+
+    /// Adds a width; one that is close to the last is left out.
+    pub fn add(&mut self, one: &MatchedWidth) {
+        let Some(last) = self.last else {
+            self.last = Some(*one);
+            return;
+        };
+        if one.position_mm - last.position_mm < SPACING_RATIO * self.gauge_mm {
+            return;
+        }
+        self.last = Some(*one);
+        let changes: [f64; TRIED] =
+            std::array::from_fn(|at| one.ln_speeds[at] - last.ln_speeds[at]);
+        let most = changes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let least = changes.iter().copied().fold(f64::INFINITY, f64::min);
+        if most - least < MIN_DIFFERENCE {
+            return;
+        }
+        let width = one.ln_width - last.ln_width;
+        self.count += 1.0;
+        self.width_squares += width * width;
+        for (sums, change) in self.sums.iter_mut().zip(changes) {
+            sums.products += width * change;
+            sums.squares += change * change;
+        }
+    }
+
+    /// The errors that are not excluded, and one more to either side: the true one lies between two that
+    /// are tried.
+    pub fn plausible(&self) -> Range<usize> {
+        if self.count == 0.0 {
+            return 0..TRIED;
+        }
+        let left = self.sums.map(|sums| self.sum_of_squares(sums));
+        let best = left.iter().copied().fold(f64::INFINITY, f64::min);
+        // The variance is not known: that of the best counts.
+        let is_plausible = |left: &f64| 0.5 * self.count * libm::log(left / best) < EXCLUDED_FROM;
+        let first = left.iter().position(is_plausible).unwrap_or(0);
+        let last = left.iter().rposition(is_plausible).unwrap_or(TRIED - 1);
+        first.saturating_sub(1)..(last + 2).min(TRIED)
+    }
+
+    /// What the exponent that fits best leaves, no less than the roughness.
+    fn sum_of_squares(&self, sums: Sums) -> f64 {
+        let fitted = -sums.products / sums.squares.max(f64::MIN_POSITIVE);
+        let exponent = fitted.clamp(EXPONENTS.0, EXPONENTS.1);
+        let left = self.width_squares + exponent * (2.0 * sums.products + exponent * sums.squares);
+        left + 2.0 * self.count * self.roughness
+    }
+}
