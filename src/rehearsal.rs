@@ -16,6 +16,7 @@ mod disk;
 mod extruder;
 pub mod fault;
 mod log;
+mod ports;
 mod robot;
 mod world;
 
@@ -39,6 +40,7 @@ use disk::Disk;
 use extruder::Extruder;
 use fault::{Fault, Faults};
 use log::Log;
+use ports::{ToExtruder, ToRobot};
 use world::{SharedWorld, VirtualClock, World};
 
 /// A run to rehearse: one bead of a cell, of the length of its simulated path.
@@ -105,10 +107,10 @@ impl Rehearsal<'_> {
             duration: Some(duration),
             ends_with_steps: false,
         };
-        let robot_port: Box<dyn RobotPort> = Box::new(robot::Port(Arc::clone(&world)));
+        let robot_port: Box<dyn RobotPort> = Box::new(ToRobot(Arc::clone(&world)));
         let extruder_port = watch
             .is_some()
-            .then(|| Box::new(extruder::Port(Arc::clone(&world))) as Box<dyn ExtruderPort>);
+            .then(|| Box::new(ToExtruder(Arc::clone(&world))) as Box<dyn ExtruderPort>);
         let runner = Runner::with_extruder(controller, robot_port, extruder_port, disk);
         let clock = VirtualClock(Arc::clone(&world));
         let ending = ControlThread::new(settings, clock, runner, watch, &log, operator).run();

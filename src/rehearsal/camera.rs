@@ -18,7 +18,7 @@ const SIDE_PX: usize = 3;
 
 /// The camera and what measures its frames.
 pub struct Camera {
-    camera: SimCamera,
+    device: SimCamera,
     repeats: RepeatDetector,
     offset: Mm,
     /// From the capture of a frame to its width.
@@ -27,10 +27,17 @@ pub struct Camera {
     /// to be earlier.
     stamp_delay: Span,
     /// The newest image and its width, again and again while the camera is frozen.
-    image: Option<(u64, Result<WidthMeasurement, Reject>)>,
+    image: Option<Image>,
     last_arrival: Stamp,
     has_failed: bool,
     has_answered: bool,
+}
+
+/// An image: its pixels are those of its number.
+#[derive(Debug, Clone, Copy)]
+struct Image {
+    number: u64,
+    outcome: Result<WidthMeasurement, Reject>,
 }
 
 /// A moment at which a frame is due.
@@ -51,7 +58,7 @@ impl Camera {
     pub fn new(cell: &Cell, run: &RunPart, calibration: &Calibration) -> Result<Self, RenderError> {
         let simulation = &cell.simulation;
         Ok(Self {
-            camera: SimCamera::new(cell, calibration.clone())?,
+            device: SimCamera::new(cell, calibration.clone())?,
             repeats: RepeatDetector::new(Roi { x: 0, y: 0, width: SIDE_PX, height: SIDE_PX }),
             offset: run.camera.offset,
             latency: simulation.latency.max(simulation.stamp_delay),
@@ -65,7 +72,7 @@ impl Camera {
 
     /// The bead rises, with its height above the first layer.
     pub fn raise(&mut self, rise: Mm) {
-        self.camera.raise(rise);
+        self.device.raise(rise);
     }
 
     /// One period: what reaches the PC, and when.
@@ -90,9 +97,13 @@ impl Camera {
         }
         self.has_answered = true;
         let under_mm = path_mm - self.offset.get();
-        let taken = self.camera.take(now, under_mm, z, bead);
+        let taken = self.device.take(now, under_mm, z, bead);
         let is_frozen = faults.has(now, FaultKind::CameraFrozen);
-        let image = self.image.take().filter(|_| is_frozen).unwrap_or((taken.seq, taken.outcome));
+        let image = self
+            .image
+            .take()
+            .filter(|_| is_frozen)
+            .unwrap_or(Image { number: taken.seq, outcome: taken.outcome });
         let mut arrival = now + self.latency + on_the_way;
         for kind in faults.at(now) {
             if let FaultKind::CameraLate(by) = kind {
@@ -105,13 +116,8 @@ impl Camera {
         Some((self.last_arrival, message?))
     }
 
-    fn measured(
-        &mut self,
-        now: Stamp,
-        seq: u64,
-        image: &(u64, Result<WidthMeasurement, Reject>),
-    ) -> Option<CameraMessage> {
-        let mut pixels = image.0.to_le_bytes().to_vec();
+    fn measured(&mut self, now: Stamp, seq: u64, image: &Image) -> Option<CameraMessage> {
+        let mut pixels = image.number.to_le_bytes().to_vec();
         pixels.resize(SIDE_PX * SIDE_PX, 0);
         let size = Size::new(SIDE_PX, SIDE_PX);
         let frame = Frame::new(seq, now + self.stamp_delay, size, Pixels::Grey8(pixels)).ok()?;
@@ -120,7 +126,7 @@ impl Camera {
             had_at: self.last_arrival,
             first_equal_at: self.repeats.first_of_equal(&frame),
             frame,
-            outcome: image.1.clone(),
+            outcome: image.outcome,
             roughness: None,
             edges: (Vec::new(), Vec::new()),
         })))

@@ -2,14 +2,13 @@
 
 use super::connection::{Change, Connection};
 use super::fault::{FaultKind, Faults};
-use super::world::{SharedWorld, lock};
 use crate::cell::extruder::ExtruderPart;
 use crate::core::{Mm3PerS, Span, Stamp};
 use crate::drivers::extruder::DriveRange;
 use crate::drivers::line::LinkEvent;
 use crate::extruder::{ExtruderCommand, ExtruderLimits};
 use crate::link::extruder::{DriveLine, ExtruderEndpoint, ExtruderLine, ExtruderStatus, on_wire};
-use crate::run::ports::{ExtruderEvent, ExtruderPort, SendError, Sent};
+use crate::run::ports::{ExtruderEvent, SendError, Sent};
 use crate::sim::extruder::{GatedExtruder, SimExtruder};
 
 /// The extruder and the PC's connection to it.
@@ -96,7 +95,7 @@ impl Extruder {
     }
 
     /// Takes a command from the PC. Returns whether it was sent, and the extruder's refusal.
-    fn take(
+    pub fn take(
         &mut self,
         now: Stamp,
         command: ExtruderCommand,
@@ -124,21 +123,5 @@ impl Extruder {
         };
         self.gated.advance(now);
         (Ok(Sent { at: now }), refusal)
-    }
-}
-
-/// The control thread's port to the extruder.
-pub struct Port(pub SharedWorld);
-
-impl ExtruderPort for Port {
-    fn send(&mut self, now: Stamp, command: ExtruderCommand) -> Result<Sent, SendError> {
-        let mut world = lock(&self.0);
-        let world = &mut *world;
-        let Some(extruder) = &mut world.extruder else {
-            return Err(SendError::NotConnected { device: "extruder" });
-        };
-        let (sent, refusal) = extruder.take(now, command, &world.faults);
-        world.arrivals.extruder(now, refusal);
-        sent
     }
 }

@@ -2,7 +2,6 @@
 
 use super::connection::{Change, Connection};
 use super::fault::{FaultKind, Faults};
-use super::world::{SharedWorld, lock};
 use crate::cell::file::RunPart;
 use crate::control::Command;
 use crate::core::{Mm, RobotState, Span, Stamp};
@@ -11,7 +10,7 @@ use crate::link::{
     ParamError, PcLine, PrintJob, RobotFaults, RobotLine, RobotParams, RobotStatus, VirtualRobot,
     on_wire,
 };
-use crate::run::ports::{RobotEvent, RobotPort, SendError, Sent};
+use crate::run::ports::{RobotEvent, SendError, Sent};
 use crate::scenario::table::Simulation;
 
 /// Pause before the bead. Derived: longer than the PC needs to connect.
@@ -20,7 +19,7 @@ const PAUSE: Span = Span::from_millis(300);
 /// The robot, its job and the PC's connection to it.
 #[derive(Debug)]
 pub struct Robot {
-    robot: VirtualRobot,
+    device: VirtualRobot,
     job: PrintJob,
     connection: Connection,
     valid_ms: u64,
@@ -46,7 +45,7 @@ impl Robot {
         };
         Ok(Self {
             job: PrintJob::new(1, Mm::ZERO, params.z, PAUSE),
-            robot: VirtualRobot::new(params, Stamp::START)?,
+            device: VirtualRobot::new(params, Stamp::START)?,
             connection: Connection::new(),
             valid_ms: u64::from(run.robot.valid_ms),
             seq: 0,
@@ -57,25 +56,25 @@ impl Robot {
 
     /// Its true state.
     pub fn state(&mut self, now: Stamp) -> RobotStatus {
-        self.robot.state(now)
+        self.device.state(now)
     }
 
     /// One period of its reports: what reaches the PC.
     pub fn report(&mut self, now: Stamp, faults: &Faults) -> Vec<RobotEvent> {
         self.apply(now, faults);
-        self.job.advance(now, &mut self.robot);
+        self.job.advance(now, &mut self.device);
         let is_reachable = !faults.has(now, FaultKind::RobotUnplugged);
         let mut events = Vec::new();
         match self.connection.advance(now, is_reachable) {
             Some(Change::Made) => {
-                self.robot.connect(now);
-                self.job.connected(self.robot.mode());
-                let _ = self.robot.take(now, PcLine::Hello);
+                self.device.connect(now);
+                self.job.connected(self.device.mode());
+                let _ = self.device.take(now, PcLine::Hello);
                 (self.seq, self.newest) = (0, None);
-                events.push(RobotEvent::Up { at: now, limits: self.robot.limits() });
+                events.push(RobotEvent::Up { at: now, limits: self.device.limits() });
             }
             Some(Change::Lost) => {
-                self.robot.disconnect(now);
+                self.device.disconnect(now);
                 self.newest = None;
                 let reason = "no STATE from the robot".to_owned();
                 events.push(RobotEvent::Down { at: now, reason });
@@ -84,7 +83,7 @@ impl Robot {
         }
         if self.connection.is_up()
             && is_reachable
-            && let Some(RobotLine::State(status)) = self.robot.report(now)
+            && let Some(RobotLine::State(status)) = self.device.report(now)
         {
             self.connection.heard(now);
             let state = self.reported(now, status, faults).into();
@@ -107,7 +106,7 @@ impl Robot {
                 _ => {}
             }
         }
-        self.robot.set_faults(now, own);
+        self.device.set_faults(now, own);
     }
 
     /// A report as the PC gets it.
@@ -120,8 +119,8 @@ impl Robot {
                 FaultKind::PathStands => path_stands = true,
                 FaultKind::ClockStands => clock_stands = true,
                 FaultKind::ClockBehind(by) => {
-                    let by_ms = u64::try_from(by.ns() / NS_PER_MS).unwrap_or(0);
-                    status.t_ms = status.t_ms.saturating_sub(by_ms);
+                    let by_ms = by.wait().as_millis();
+                    status.t_ms = status.t_ms.saturating_sub(u64::try_from(by_ms).unwrap_or(0));
                 }
                 _ => {}
             }
@@ -140,7 +139,7 @@ impl Robot {
 
     /// Takes a command from the PC, as the driver of the line link writes it. Returns whether it was
     /// sent, and the robot's refusal.
-    fn take(
+    pub fn take(
         &mut self,
         now: Stamp,
         command: Command,
@@ -168,28 +167,12 @@ impl Robot {
         if faults.has(now, FaultKind::RobotUnplugged) {
             return (Ok(Sent { at: now }), None);
         }
-        let refusal = match self.robot.take(now, line) {
+        let refusal = match self.device.take(now, line) {
             Some(RobotLine::Err { seq, code, text }) => {
                 Some(LinkEvent::<_, RobotStatus>::Refused { at: now, seq, code, text }.into())
             }
             _ => None,
         };
         (Ok(Sent { at: now }), refusal)
-    }
-}
-
-/// Nanoseconds in a millisecond. Derived.
-const NS_PER_MS: i64 = 1_000_000;
-
-/// The control thread's port to the robot.
-pub struct Port(pub SharedWorld);
-
-impl RobotPort for Port {
-    fn send(&mut self, now: Stamp, command: Command) -> Result<Sent, SendError> {
-        let mut world = lock(&self.0);
-        let world = &mut *world;
-        let (sent, refusal) = world.robot.take(now, command, &world.faults);
-        world.arrivals.robot(now, refusal);
-        sent
     }
 }

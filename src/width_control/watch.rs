@@ -60,7 +60,8 @@ impl BeadWatch {
         Self {
             offset,
             speeds: SpeedHistory::new(reference_speed.get(), kept_mm),
-            response: ResponseTest::new(offset, gauge, roughness),
+            // PI control changes the speed in a ramp, which a drift of the flow imitates.
+            response: ResponseTest::new(offset, gauge, roughness, settings.exponent.is_some()),
             offset_test: settings
                 .exponent
                 .map(|exponent| OffsetTest::new(offset, gauge, exponent, roughness)),

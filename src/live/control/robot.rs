@@ -18,7 +18,7 @@ impl<I: Inputs, K: Recorder> ControlThread<'_, I, K> {
             }
             RobotEvent::Down { reason, .. } => (self.operator.notice)(&format!("robot: {reason}")),
             RobotEvent::Refused { text, .. } => {
-                (self.operator.notice)(&format!("robot refused {text}"))
+                (self.operator.notice)(&format!("robot refused {text}"));
             }
         }
         self.give(event.into());

@@ -20,15 +20,17 @@ use crate::rehearsal::{Rehearsal, Rehearsed};
 use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
 
-/// Length of a bead \[mm\].
+/// Length of a bead \[mm\]. Derived: two metres and more after the fault.
 const LENGTH_MM: f64 = 3000.0;
 /// Duration after which a run is ended \[s\]. Derived: the bead at the slowest speed takes 50 s.
 const MAX_DURATION_S: f64 = 60.0;
 /// When faults begin, uniform between two times \[s\]. Derived: the bead is in its width by then.
 const FROM_S: (f64, f64) = (8.0, 12.0);
-/// Path on which the flow steps by 8 %, about the place of the fault \[mm\].
+/// Largest distance of a step of the flow from the place of the fault \[mm\]. Derived: so far behind the
+/// nozzle does the camera of the study's cell still see, with its longest gauge.
 const STEP_WITHIN_MM: f64 = 150.0;
-/// Length of bead at its end that is judged \[mm\].
+/// Length of bead at its end that is judged \[mm\]. Derived: three times the way that a change takes to
+/// be seen.
 const JUDGED_MM: f64 = 300.0;
 /// Length of bead that may be missing at the end \[mm\]. Derived: the way between two reports, of which
 /// the last one says that the robot does not print any more.
@@ -202,15 +204,12 @@ impl FaultCase {
             rows.push(row(Quantity::ratio("fraction not held in time"), late, 0.01));
             rows.push(row(largest, quantile(&held, 1.0), f64::INFINITY));
         }
-        rows.push(match self.stopped_within_s {
-            Some(within_s) => {
-                let late = fraction(&|one| one.stopped_s > within_s);
-                row(Quantity::ratio("fraction not stopped in time"), late, 0.01)
-            }
-            None => {
-                let off = fraction(&|one| one.end_error_mm > BAND_MM);
-                row(Quantity::ratio("fraction not in its width again"), off, 0.05)
-            }
+        rows.push(if let Some(within_s) = self.stopped_within_s {
+            let late = fraction(&|one| one.stopped_s > within_s);
+            row(Quantity::ratio("fraction not stopped in time"), late, 0.01)
+        } else {
+            let off = fraction(&|one| one.end_error_mm > BAND_MM);
+            row(Quantity::ratio("fraction not in its width again"), off, 0.05)
         });
         rows
     }

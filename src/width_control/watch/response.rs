@@ -62,6 +62,8 @@ pub struct ResponseTest {
     changes: VecDeque<Change>,
     /// Where the camera may look, by the bead before that path.
     offsets: PlausibleOffsets,
+    /// Whether bead that has answered excludes places.
+    excludes_offsets: bool,
 }
 
 /// Change of ln w and of ln v from one width to another.
@@ -74,12 +76,12 @@ struct Change {
 
 impl ResponseTest {
     /// Before the first width: the camera's offset, the length of the gauge, and the variance of ln w
-    /// by the roughness over it.
-    pub fn new(offset: Mm, gauge: Mm, roughness: f64) -> Self {
+    /// by the roughness over it; and whether places at which the camera cannot look are excluded.
+    pub fn new(offset: Mm, gauge: Mm, roughness: f64, excludes_offsets: bool) -> Self {
         let (offset_mm, gauge_mm) = (offset.get(), gauge.get());
         let (widths, changes) = (VecDeque::new(), VecDeque::new());
         let offsets = PlausibleOffsets::new(offset_mm, gauge_mm, roughness);
-        Self { offset_mm, gauge_mm, roughness, widths, changes, offsets }
+        Self { offset_mm, gauge_mm, roughness, widths, changes, offsets, excludes_offsets }
     }
 
     /// A new bead, or one that goes on elsewhere.
@@ -117,7 +119,9 @@ impl ResponseTest {
         }
         let oldest = oldest?;
         self.widths.push_front(oldest);
-        self.offsets.add(&oldest);
+        if self.excludes_offsets {
+            self.offsets.add(&oldest);
+        }
         let found = self.compare(&oldest, &newest, reading, target).map(|over_mm| NoResponse {
             speed_change: libm::expm1(newest.ln_speed() - oldest.ln_speed()),
             width_change: libm::expm1(newest.ln_width - oldest.ln_width),
@@ -227,7 +231,7 @@ mod tests {
             offset: Mm::constant(OFFSET_MM),
             gauge: Mm::constant(GAUGE_MM),
             reference_speed: MmPerS::constant(100.0),
-            exponent: None,
+            exponent: Some(0.25),
             roughness: BeadRoughness { ratio: 0.0025, length_mm: 5.0 },
         });
         let (mut path, mut at) = (0.0, 0.0);
