@@ -78,7 +78,7 @@ const ROOMS: [(&str, &[&str]); 28] = [
             "sim",
         ],
     ),
-    ("simulators", &["core", "extruder", "link", "run", "sim", "io"]),
+    ("simulators", &["core", "extruder", "link", "sim", "io"]),
     (
         "drivers",
         &[
