@@ -41,6 +41,7 @@ use extruder::Extruder;
 use fault::{Fault, Faults};
 use log::Log;
 use ports::{ToExtruder, ToRobot};
+pub use robot::PAUSE;
 use world::{SharedWorld, VirtualClock, World};
 
 /// A run to rehearse: one bead of a cell, of the length of its simulated path.

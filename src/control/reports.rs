@@ -16,9 +16,9 @@ const STEP_MARGIN: Mm = Mm::constant(10.0);
 const MAX_DELAY: Span = Span::from_millis(30);
 /// Resolution of a robot's clock (`docs/src/reference/robot-link.md`, § Robot to PC).
 const CLOCK_STEP: Span = Span::from_millis(1);
-/// How much faster a robot's clock may run than the PC's, as a fraction. Derived: twice the 100 ppm of
-/// a cheap quartz.
-const CLOCK_DRIFT: f64 = 2e-4;
+/// Time constant in which a delay decays \[s\]: clocks drift apart. Derived: that of
+/// `width_control::speed_history`; a clock that is 0.1 % slow is then a millisecond behind.
+const DELAY_TIME_CONSTANT_S: f64 = 1.0;
 
 /// Compares each report with the one before it on the same connection, while bead is laid.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -69,7 +69,8 @@ impl ReportMonitor {
             Some((now - last.moment.arrived, Span::from_millis(i64::try_from(on_robot).ok()?)))
         });
         let delay = passed.map_or(Span::ZERO, |(here, on_robot)| {
-            self.delay + here - on_robot - Span::from_secs(CLOCK_DRIFT * here.secs())
+            let kept = libm::exp(-here.secs() / DELAY_TIME_CONSTANT_S);
+            Span::from_secs(kept * self.delay.secs()) + here - on_robot
         });
         self.delay = if delay > MAX_DELAY { Span::ZERO } else { delay.max(Span::ZERO) };
         now - (self.delay - CLOCK_STEP).max(Span::ZERO)

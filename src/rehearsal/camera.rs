@@ -23,8 +23,8 @@ pub struct Camera {
     offset: Mm,
     /// From the capture of a frame to its width.
     latency: Span,
-    /// How much later than its capture a frame has its stamp, and by how much the program takes it
-    /// to be earlier.
+    /// How much later than its capture a frame is for the program: the delay of its stamp, less the
+    /// latency that the cell states.
     stamp_delay: Span,
     /// The newest image and its width, again and again while the camera is frozen.
     image: Option<Image>,

@@ -20,7 +20,7 @@ pub struct Extruder {
     period: Span,
     valid_ms: u64,
     seq: u64,
-    /// Clock of the last report that has reached the PC on this connection \[ms\].
+    /// Clock of the last report on this connection \[ms\].
     newest_ms: Option<u64>,
     has_failed: bool,
 }

@@ -38,11 +38,11 @@ pub enum FaultKind {
     RobotUnplugged,
     /// The robot moves at this fraction of its setpoint.
     RobotSlow(f64),
-    /// The pump fails.
+    /// The pump fails for good.
     PumpFails,
     /// No line reaches the extruder or comes from it.
     ExtruderUnplugged,
-    /// The disk is full.
+    /// The disk is full, for good.
     DiskFull,
 }
 

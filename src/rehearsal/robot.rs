@@ -14,7 +14,7 @@ use crate::run::ports::{RobotEvent, SendError, Sent};
 use crate::scenario::table::Simulation;
 
 /// Pause before the bead. Derived: longer than the PC needs to connect.
-const PAUSE: Span = Span::from_millis(300);
+pub const PAUSE: Span = Span::from_millis(300);
 
 /// The robot, its job and the PC's connection to it.
 #[derive(Debug)]
@@ -137,8 +137,7 @@ impl Robot {
         status
     }
 
-    /// Takes a command from the PC, as the driver of the line link writes it. Returns whether it was
-    /// sent, and the robot's refusal.
+    /// Takes a command from the PC. Returns whether it was sent, and the robot's refusal.
     pub fn take(
         &mut self,
         now: Stamp,

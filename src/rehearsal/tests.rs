@@ -65,7 +65,8 @@ fn a_bead_without_a_fault_is_laid_to_its_end_without_a_hold_and_the_same_every_t
     let held = one.first(0.0, |state| holds(state) && *state != State::Holding(Hold::Stopping));
     assert_eq!((&one.ending, held), (&Ending::TimeOver, None), "{:?}", one.notices);
     assert_eq!(one.robot.last().unwrap().1.mode, RobotMode::Idle);
-    assert!((one.bead.end_mm().unwrap() - 1500.0).abs() < 1.0);
+    // What the robot lays after its last report in `PRINT` is not seen.
+    assert!((one.bead.end_mm().unwrap() - 1500.0).abs() < 3.0);
     let target_mm = 42.0;
     let late = one.bead.smooth_width_at(1200.0).unwrap();
     assert!((late - target_mm).abs() < 0.5, "{late}");

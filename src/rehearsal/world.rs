@@ -20,8 +20,8 @@ use crate::sim::laid::LaidBead;
 use crate::sim::nozzle::Nozzle;
 use crate::sim::other_bead::OtherView;
 
-/// Longest time from a report to its arrival. Derived: a tenth of the shortest time between the setpoints
-/// of the studies' cells would be 5 ms; a local network and a PC that is not quite idle need less.
+/// Longest time from a report to its arrival: that of a local network and a PC that is not quite idle.
+/// A larger one asks more of the reports' clocks.
 const MAX_JITTER: Span = Span::from_millis(3);
 
 /// The world, shared by the control thread's inputs and its ports.
@@ -38,6 +38,9 @@ pub fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
 pub struct Arrivals {
     inputs: BTreeMap<(Stamp, u64), LiveInput>,
     sent: u64,
+    /// The last arrivals from robot and extruder: on a connection nothing overtakes.
+    last_of_robot: Stamp,
+    last_of_extruder: Stamp,
 }
 
 impl Arrivals {
@@ -49,14 +52,16 @@ impl Arrivals {
     /// Reports of the robot.
     pub fn robot(&mut self, at: Stamp, events: impl IntoIterator<Item = RobotEvent>) {
         for event in events {
-            self.add(at, LiveInput::Robot(event));
+            self.last_of_robot = self.last_of_robot.max(at);
+            self.add(self.last_of_robot, LiveInput::Robot(event));
         }
     }
 
     /// Reports of the extruder.
     pub fn extruder(&mut self, at: Stamp, events: impl IntoIterator<Item = ExtruderEvent>) {
         for event in events {
-            self.add(at, LiveInput::Extruder(event));
+            self.last_of_extruder = self.last_of_extruder.max(at);
+            self.add(self.last_of_extruder, LiveInput::Extruder(event));
         }
     }
 

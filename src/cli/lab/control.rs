@@ -14,14 +14,14 @@ use crate::rows::output;
 use crate::studies::control::Case;
 use crate::studies::control::table::{CaseRow, plain};
 
-/// Controls simulated beads and pressures that are not the model's.
+/// Controls simulated beads and pressures that are not the model's, with machines that fail.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
   truebead lab control steps --out control
 
-Prints a table and leaves control.json. Every figure is that of the bead's true width, or of the
-true pressure at the nozzle.
+Prints a table and leaves control.json. Every figure is that of the bead's true width, of the true
+pressure at the nozzle, or of when control held and the robot stopped.
 Status 1 if a figure is above what is required.")]
 pub struct ControlArgs {
     /// The cases; all of them where none is named

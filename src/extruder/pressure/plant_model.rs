@@ -101,6 +101,11 @@ impl PlantModel {
         }
     }
 
+    /// The given gain over that of the model in use, where that is less; else 1.
+    pub fn given_gain_ratio(&self) -> f64 {
+        (1.0 / self.in_use.gain).max(1.0)
+    }
+
     /// A command from `at_s` on; not before the last one.
     pub fn push(&mut self, at_s: f64, speed_rpm: f64) {
         for history in &mut self.commanded {

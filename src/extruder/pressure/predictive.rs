@@ -254,6 +254,7 @@ impl PredictiveController {
             measured: arrived + self.load.now() + self.residual.filtered(),
             sigma: self.residual.sigma(),
             lateness: (now_s - step.began_s) / (dead_s + delay_s),
+            given_gain: self.plant.given_gain_ratio(),
         };
         let bound = step.bound(now_s, self.target, &answer);
         self.step = Some(step);

@@ -8,7 +8,7 @@
 /// with twice the gain the overshoot stays below 30 %, and without an error of the model the
 /// integral of the error of a step in Ma et al. 2026 below 0.39 MPa·s.
 const OVERSHOOT_UNSEEN: f64 = 0.288;
-/// Largest gain over the model's that is expected, of a plant with the model's dead time. One of a
+/// Largest gain over the given one that is expected, of a plant with the model's dead time. One of a
 /// plant with a longer dead time is smaller by as much: PI control would not hold it else.
 const LARGEST_GAIN: f64 = 2.0;
 /// Fraction of the step by which the model must have moved before the pressure is expected to.
@@ -33,6 +33,8 @@ pub struct Answer {
     pub sigma: f64,
     /// Time since the step over the dead time. What arrives before 1 was under way already.
     pub lateness: f64,
+    /// The given gain over that of the model, where an earlier answer has shown less; else 1.
+    pub given_gain: f64,
 }
 
 /// The step.
@@ -117,7 +119,7 @@ impl TargetStep {
         let confirmed = answered.clamp(moved_late.min(moved), moved.max(moved_late));
         // A pressure that moves already may do so with twice the gain.
         let lateness = if self.must_answer { answer.lateness } else { 1.0 };
-        let largest_gain = LARGEST_GAIN / lateness.clamp(1.0, LARGEST_GAIN);
+        let largest_gain = answer.given_gain * LARGEST_GAIN / lateness.clamp(1.0, LARGEST_GAIN);
         let farthest = (confirmed + (to_go + OVERSHOOT_UNSEEN * size) / largest_gain).min(size);
         commanded + sign * farthest
     }
@@ -128,7 +130,7 @@ mod tests {
     use super::*;
 
     fn answer(arrived: f64, arrived_late: f64, measured: f64) -> Answer {
-        Answer { arrived, arrived_late, measured, sigma: 0.007, lateness: 1.0 }
+        Answer { arrived, arrived_late, measured, sigma: 0.007, lateness: 1.0, given_gain: 1.0 }
     }
 
     #[test]

@@ -338,6 +338,28 @@ fn a_second_step_while_the_first_is_answered_takes_no_longer_than_the_first() {
     assert!(after_s < 1.15, "{after_s}");
 }
 
+/// A load that falls while a step is answered looks like less gain: the next step is no larger for it.
+#[test]
+fn a_load_beside_the_answer_does_not_make_the_next_step_overshoot() {
+    for load in [-0.3, -0.2, 0.2] {
+        for at_s in [0.6, 0.8, 1.0] {
+            let start = running(0.6, 0.6, 0.6);
+            let mut controller = predictive(free(), start);
+            let load = Some(LoadChange { at_s, rpm: load });
+            let mut plant =
+                SimPressure::new(model(), Disturbances { load, ..noisy(2) }, FASTEST, start);
+            let target = |at: f64| match at {
+                ..0.1 => 0.6,
+                ..12.0 => 1.0,
+                _ => 1.4,
+            };
+            let trajectory = drive(&mut controller, &mut plant, 24.0, target);
+            let highest = trajectory[2401..].iter().map(|one| one.0).fold(f64::MIN, f64::max);
+            assert!(highest < 1.4 + 0.3 * 0.4, "{load:?}: {highest}");
+        }
+    }
+}
+
 #[test]
 fn a_screw_at_its_limit_or_slow_to_speed_up_is_no_lack_of_an_answer() {
     let start = running(0.95, 0.95, 0.95);
