@@ -176,4 +176,14 @@ mod tests {
         assert!((bound - 0.6).abs() < 1e-12, "{bound}");
         assert_eq!(step.unanswered_s(5.0), Some(2.0));
     }
+
+    #[test]
+    fn a_gain_that_an_earlier_answer_has_shown_is_not_relied_on() {
+        let mut step = TargetStep::new(0.0, 0.0, 0.0, 0.0);
+        let shown = Answer { given_gain: 2.5, ..answer(0.0, 0.0, 0.0) };
+        let bound = step.bound(0.1, 0.6, &shown);
+        // With the given gain the pressure goes as far as it does in a first step.
+        let first = TargetStep::new(0.0, 0.0, 0.0, 0.0).bound(0.1, 0.6, &answer(0.0, 0.0, 0.0));
+        assert!((2.5 * bound - first).abs() < 1e-9, "{bound} {first}");
+    }
 }
