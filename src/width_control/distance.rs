@@ -308,7 +308,7 @@ impl DistanceController {
             return WidthUse::Taken;
         }
         self.outliers = OutlierRun::default();
-        let informs = self.model.informs_exponent(sample.ln_speed) && !self.pulsation.is_found();
+        let informs = self.model.informs_exponent(&observation) && !self.pulsation.is_found();
         self.model.update(&observation, informs);
         WidthUse::Taken
     }

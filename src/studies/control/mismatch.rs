@@ -75,3 +75,27 @@ fn drawn_plan(cell: LoopCell, control: Control, seed: u64) -> Result<Plan, Repro
 
 /// Random stream of what is drawn. Derived: the bytes of "mismatch".
 const MISMATCH_STREAM: u64 = 0x6d69_736d_6174_6368;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    /// Half the exponent of the bead, and a camera that looks a fifth farther back or less far than
+    /// is known: the speed changes too much, and its effect comes late or early. Taken for one of
+    /// the exponent it drove the speed from limit to limit.
+    #[test]
+    fn too_small_an_exponent_with_a_wrong_offset_is_no_limit_cycle() {
+        for cell in LoopCell::ALL.into_iter().filter(|cell| !cell.is_gauge_long()) {
+            for offset in [0.8, 1.2] {
+                let mut plan = Plan::new(cell, Control::Distance).unwrap();
+                let bead = &mut plan.cell.simulation.bead;
+                (bead.exponent, bead.slow_exponent) = (0.45, 0.5);
+                plan.assumed_offset = offset;
+                let found = plan.each(10, errors).unwrap();
+                assert!(found.iter().all(|rms_mm| *rms_mm < 0.5), "{cell:?}, {offset}: {found:?}");
+            }
+        }
+    }
+}

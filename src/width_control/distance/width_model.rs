@@ -149,11 +149,16 @@ impl WidthModel {
         self.state.y
     }
 
-    /// Whether a width of bead laid at ln(v/v₀) informs b: its speed differs clearly from the
-    /// speed at which the width is known best.
-    pub fn informs_exponent(&self, ln_speed: f64) -> bool {
+    /// Whether a width informs b: its speed differs clearly from the speed at which the width is known
+    /// best, and is the same wherever the camera may look. Beside a change of the speed an error of
+    /// the offset would be taken for one of b.
+    pub fn informs_exponent(&self, observation: &WidthObservation) -> bool {
         let (both, exponent) = (self.covariance.m12, self.covariance.m22);
-        exponent > 0.0 && (ln_speed - both / exponent).abs() > MIN_LN_SPEED_DIFFERENCE
+        let differs = observation.ln_speed - both / exponent;
+        let by_offset = observation.ln_speed_beside.map(|by| (self.exponent() * by).abs());
+        exponent > 0.0
+            && differs.abs() > MIN_LN_SPEED_DIFFERENCE
+            && by_offset.into_iter().all(|by| by < OTHER_SIGMA)
     }
 
     /// Standard deviation of ln A, given b.
