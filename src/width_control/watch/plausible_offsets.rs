@@ -27,6 +27,10 @@ const SPACING_RATIO: f64 = 0.5;
 const MIN_DIFFERENCE: f64 = 0.05;
 /// Exponents that are possible. Derived: those of the test of the answer.
 const EXPONENTS: (f64, f64) = (0.15, 1.0);
+/// Largest number of changes that count. Control that cancels a pulsation makes hundreds that are alike;
+/// where its own answer happens to fit the wave, they are no more evidence than a few. Derived: three
+/// changes of the speed, each seen by up to three widths at either of two places, are 18.
+const MAX_COUNT: f64 = 20.0;
 /// Log likelihood ratio to the best from which on an error is excluded. Derived: odds of three thousand.
 const EXCLUDED_FROM: f64 = 8.0;
 
@@ -47,11 +51,18 @@ impl MatchedWidth {
         self.ln_speeds[STEPS]
     }
 
-    /// Size of the change of ln v since an earlier width: the smallest of a range of errors.
-    pub fn speed_change(&self, earlier: &Self, errors: Range<usize>) -> f64 {
+    /// Size of the change of ln A since an earlier width, with an exponent: the smallest of a range of
+    /// errors. A width that has changed the other way than the speed asks for shows no more than one that
+    /// has stayed.
+    pub fn flow_change(&self, earlier: &Self, exponent: f64, errors: Range<usize>) -> f64 {
+        let width = self.ln_width - earlier.ln_width;
         let changes = self.ln_speeds.iter().zip(&earlier.ln_speeds).map(|(now, then)| now - then);
         let plausible = changes.skip(errors.start).take(errors.len());
-        plausible.map(f64::abs).fold(f64::INFINITY, f64::min)
+        let flow = |change: f64| {
+            let answer = exponent * change;
+            answer.abs().min((width + answer).abs())
+        };
+        plausible.map(flow).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -145,8 +156,9 @@ impl PlausibleOffsets {
         }
         let left = self.sums.map(|sums| self.sum_of_squares(sums));
         let best = left.iter().copied().fold(f64::INFINITY, f64::min);
+        let count = self.count.min(MAX_COUNT);
         // The variance is not known: that of the best counts.
-        let is_plausible = |left: &f64| 0.5 * self.count * libm::log(left / best) < EXCLUDED_FROM;
+        let is_plausible = |left: &f64| 0.5 * count * libm::log(left / best) < EXCLUDED_FROM;
         let first = left.iter().position(is_plausible).unwrap_or(0);
         let last = left.iter().rposition(is_plausible).unwrap_or(TRIED - 1);
         first.saturating_sub(1)..(last + 2).min(TRIED)
@@ -158,5 +170,30 @@ impl PlausibleOffsets {
         let exponent = fitted.clamp(EXPONENTS.0, EXPONENTS.1);
         let left = self.width_squares + exponent * (2.0 * sums.products + exponent * sums.squares);
         left + 2.0 * self.count * self.roughness
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::hash;
+
+    #[test]
+    fn changes_of_one_kind_exclude_no_more_by_being_many() {
+        let mut offsets = PlausibleOffsets::new(88.4, 12.7, 2.6e-6);
+        for number in 0..400_u32 {
+            let [nearest, other] = hash::normal_pair(hash::mix(&[1, u64::from(number)]));
+            let [flow, _] = hash::normal_pair(hash::mix(&[2, u64::from(number)]));
+            let mut ln_speeds = [0.1 * other; TRIED];
+            ln_speeds[0] = 0.1 * nearest;
+            // Where the camera does not look, the speed happens to go with the wave of the flow.
+            let ln_width = 0.03 * flow - 0.02 * nearest;
+            offsets.add(&MatchedWidth {
+                position_mm: 7.0 * f64::from(number),
+                ln_width,
+                ln_speeds,
+            });
+        }
+        assert_eq!(offsets.plausible(), 0..TRIED);
     }
 }
