@@ -1,7 +1,9 @@
 //! The model in use: the given one, until the answer to a step of the target shows another plant.
 //! After a step the pressure moves by far more than its noise, so that gain, lag and dead time are
-//! found by least squares: the gain for each lag and dead time of a grid. A prior divides between
-//! gain and lag what the first readings do not yet tell apart.
+//! found by least squares: the gain for each lag and dead time of a grid. A prior of the lag divides
+//! between the two what the first readings do not yet tell apart.
+
+use std::ops::RangeInclusive;
 
 use super::Fopdt;
 use super::command_history::CommandHistory;
@@ -20,22 +22,22 @@ const SHORTEST_DEAD_TIME: f64 = 0.25;
 const DEAD_TIME_SPACING: f64 = 1.0 / 32.0;
 /// The given dead time in the grid. Derived: its index.
 const GIVEN_DEAD_TIME: usize = 24;
-/// Smallest gain over the given one. Derived: less than half of the 0.5 that is expected at least.
-const SMALLEST_GAIN: f64 = 0.2;
+/// Gains over the given one. Derived: half to twice, and a quarter more; others are no answer, but a
+/// load.
+const GAINS: RangeInclusive<f64> = 0.4..=2.5;
 /// Standard deviation of the pressure of every model of the grid, as a fraction of the step. Derived:
 /// the noise of Ma et al. 2026 is as large.
 const MODEL_ERROR: f64 = 0.01;
 /// Standard deviation of the time of a reading, in readings. Derived: it may be half of one off.
 const TIMING_ERROR: f64 = 0.5;
-/// Weight of the squared logarithms of gain and lag over the given ones. Derived: that of a standard
-/// deviation of a third.
-const PRIOR: f64 = 12.0;
-/// The same of a lag that is shorter. Derived: three times as much, so that a quick answer counts as a
-/// large gain first, which overshoots less.
-const SHORTER_LAG_PRIOR: f64 = 36.0;
+/// Weight of the squared logarithm of the lag over the given one. Derived: that of a standard
+/// deviation of a fifth, so that a quick answer counts as a large gain first, which overshoots less. The
+/// gain has none: the commands would stop for a while before a plant has half of it.
+const LAG_PRIOR: f64 = 24.0;
 /// Sum of squares of an answer that counts, in variances. Derived: the gain is known to 9 %, one over
 /// its root. A smaller one takes the first readings of twice the gain for the given one, a larger one
-/// waits for longer.
+/// waits for longer. A dead time that is longer than the given one leaves less gain to allow for: the
+/// error of it may be as many times as large.
 const MIN_ANSWER: f64 = 130.0;
 /// Log likelihood ratio, doubled, from which a model with less than the given gain is used: with it
 /// the commands go farther. Derived: once in 600 by chance (χ² of one degree of freedom).
@@ -158,14 +160,13 @@ impl PlantModel {
     pub fn likeliest(&self) -> Option<GridModel> {
         let mut best = (f64::INFINITY, None);
         for ((lag, ratio), fits) in LAGS.iter().enumerate().zip(&self.fits) {
-            let prior = if lag < GIVEN_LAG { SHORTER_LAG_PRIOR } else { PRIOR };
-            let off = prior * libm::log(*ratio).powi(2);
+            let off = LAG_PRIOR * libm::log(*ratio).powi(2);
             let mut dead_time = SHORTEST_DEAD_TIME;
             for sums in fits {
                 let gain = sums.product / sums.square.max(f64::MIN_POSITIVE);
                 let explained = sums.product * gain;
-                if gain > SMALLEST_GAIN && explained > MIN_ANSWER {
-                    let off = off + PRIOR * libm::log(gain).powi(2);
+                let late = dead_time.max(1.0);
+                if GAINS.contains(&gain) && explained * late * late > MIN_ANSWER {
                     let cost = self.answer - explained + off;
                     if cost < best.0 {
                         best = (cost, Some(GridModel { gain, lag, dead_time }));

@@ -39,6 +39,9 @@ const ANSWERED_FOR: f64 = 1.0;
 /// Time in which a pressure answers a step of its target, in dead times and lags together. Derived:
 /// 98 % of the answer of a plant that is twice as slow as the model.
 const ANSWER_WITHIN: f64 = 5.0;
+/// The same where no lack of an answer is noticed: a load has come, and hides it. Derived: 63 % of the
+/// answer of a plant that is twice as slow.
+const HIDDEN_ANSWER_WITHIN: f64 = 2.0;
 /// The same since the model, with the screw's limits, predicts an answer. Derived: less the dead time.
 const ANSWER_SINCE_ASKED: f64 = 4.0;
 /// Shortest such time \[s\]: a plant may be much quicker than its readings. Derived: fifty of them in
@@ -133,21 +136,17 @@ impl PredictiveController {
             }
             self.awake_until_s = now_s + self.tuning.awake_s;
         }
+        let hidden_s = (HIDDEN_ANSWER_WITHIN * self.span_s()).max(MIN_ANSWER_S);
         let is_over = |step: TargetStep| {
             let lasts_s = now_s - step.began_s;
             match step.answered_s {
                 Some(answered_s) => now_s - answered_s > ANSWERED_FOR * self.span_s(),
-                None => lasts_s > self.answers_within_s() && step.unanswered_s(now_s).is_none(),
+                None => lasts_s > hidden_s && step.unanswered_s(now_s).is_none(),
             }
         };
         if self.step.is_some_and(is_over) {
             self.step = None;
         }
-    }
-
-    /// Time in which a pressure answers \[s\].
-    fn answers_within_s(&self) -> f64 {
-        (ANSWER_WITHIN * self.span_s()).max(MIN_ANSWER_S)
     }
 
     fn begin_step(&mut self, now_s: f64) {
@@ -315,9 +314,10 @@ impl PressureController for PredictiveController {
     }
 
     fn is_unanswered(&self, now: Stamp) -> bool {
+        let within_s = (ANSWER_WITHIN * self.span_s()).max(MIN_ANSWER_S);
         let since_asked_s = (ANSWER_SINCE_ASKED * self.span_s()).max(MIN_ANSWER_S);
         self.step.is_some_and(|step| {
-            now.secs() - step.began_s > self.answers_within_s()
+            now.secs() - step.began_s > within_s
                 && step.unanswered_s(now.secs()).is_some_and(|missing| missing > since_asked_s)
         })
     }

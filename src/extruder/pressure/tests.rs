@@ -360,6 +360,41 @@ fn a_load_beside_the_answer_does_not_make_the_next_step_overshoot() {
     }
 }
 
+/// Integral of the size of the error of a step from rest to 0.6 MPa \[MPa·s\].
+fn error_of_a_step(process: Fopdt, seed: u64) -> f64 {
+    let start = running(0.0, 0.0, 0.0);
+    let mut plant = SimPressure::new(process, noisy(seed), FASTEST, start);
+    let trajectory = drive(&mut predictive(free(), start), &mut plant, 16.6, |_| 0.6);
+    trajectory.iter().map(|one| (one.0 - 0.6).abs() * 0.005).sum()
+}
+
+/// 0.49 MPa·s of it are lost in the dead time.
+#[test]
+fn half_the_gain_and_twice_the_dead_time_are_found_in_time() {
+    let process = Fopdt::new(0.5, 0.84, 0.82).unwrap();
+    let found: f64 = (0..20).map(|seed| error_of_a_step(process, seed) / 20.0).sum();
+    assert!(found < 0.882, "{found}");
+}
+
+/// What is left of the answer is less than half of what the model predicts: that is no stuck sensor.
+#[test]
+fn a_load_against_the_answer_to_a_small_step_is_no_lack_of_it() {
+    for (gain, lag, dead, at_s) in [(0.57, 0.84, 0.5, 0.38), (0.52, 0.84, 0.36, 0.53)] {
+        for (sign, seed) in [(1.0, 0), (1.0, 1), (-1.0, 2), (-1.0, 3)] {
+            let start = running(0.6, 0.6, 0.6 / gain);
+            let process = Fopdt::new(gain, lag, dead).unwrap();
+            let load = Some(LoadChange { at_s, rpm: -sign * 0.1 / gain });
+            let disturbed = Disturbances { load, ..noisy(seed) };
+            let mut plant = SimPressure::new(process, disturbed, FASTEST, start);
+            let target = |at: f64| if at < 0.1 { 0.6 } else { 0.6 + sign * 0.1 };
+            let trajectory = drive(&mut predictive(free(), start), &mut plant, 12.0, target);
+            let error: f64 =
+                trajectory.iter().map(|one| (one.0 - 0.6 - sign * 0.1).abs() * 0.005).sum();
+            assert!(error < 0.7, "{process:?} {seed}: {error}");
+        }
+    }
+}
+
 #[test]
 fn a_screw_at_its_limit_or_slow_to_speed_up_is_no_lack_of_an_answer() {
     let start = running(0.95, 0.95, 0.95);
