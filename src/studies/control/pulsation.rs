@@ -130,7 +130,8 @@ mod tests {
 
     use super::*;
 
-    /// Beads on which a level and a pulsation that were estimated apart drove each other away.
+    /// Beads on which a level and a pulsation that were estimated apart drove each other away, and
+    /// some on which a slow wave was taken for an error of the offset.
     #[test]
     fn no_bead_is_worse_than_without_control() {
         let [short, _, slow_and_long, long] = LoopCell::ALL;
@@ -145,6 +146,11 @@ mod tests {
             (long, 0.03, 3.5, 50),
             (long, 0.02, 2.0, 75),
             (long, 0.02, 10.0, 68),
+            (long, 0.02, 10.0, 19),
+            (long, 0.02, 10.0, 5),
+            (long, 0.03, 10.0, 33),
+            (short, 0.02, 10.0, 35),
+            (short, 0.03, 10.0, 32),
         ] {
             let rms = |control| {
                 let plan = pulsating(cell, control, amplitude, period_s).unwrap();

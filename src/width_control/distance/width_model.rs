@@ -6,7 +6,8 @@ use nalgebra::{Matrix2, Matrix4, Vector4};
 use super::exponent::Exponent;
 
 /// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
-/// does not move ln A less, but b, which would take a wave for an effect of the speed.
+/// does not move ln A less, but b and the errors of the offset, which would take a wave for an
+/// effect of the speed.
 const OTHER_SIGMA: f64 = 0.007;
 /// Smallest difference of ln v to the best known speed at which a width updates b: noise of
 /// reported speeds below it would bias b towards 0 (errors in variables).
@@ -155,10 +156,15 @@ impl WidthModel {
     pub fn informs_exponent(&self, observation: &WidthObservation) -> bool {
         let (both, exponent) = (self.covariance.m12, self.covariance.m22);
         let differs = observation.ln_speed - both / exponent;
-        let by_offset = observation.ln_speed_beside.map(|by| (self.exponent() * by).abs());
         exponent > 0.0
             && differs.abs() > MIN_LN_SPEED_DIFFERENCE
-            && by_offset.into_iter().all(|by| by < OTHER_SIGMA)
+            && !self.informs_offset(observation)
+    }
+
+    /// Whether a width informs the errors of the offset: one within its tolerance changes it by more
+    /// than what no part of the model describes. Elsewhere a slow wave would be taken for them.
+    fn informs_offset(&self, observation: &WidthObservation) -> bool {
+        observation.ln_speed_beside.iter().any(|by| (self.exponent() * by).abs() >= OTHER_SIGMA)
     }
 
     /// Standard deviation of ln A, given b.
@@ -189,8 +195,8 @@ impl WidthModel {
         }
     }
 
-    /// Updates the model with a width. Where `learns` is false b stays and its uncertainty is
-    /// considered (Schmidt 1966).
+    /// Updates the model with a width. Where `learns` is false b stays, away from changes of the speed
+    /// the errors of the offset stay, and their uncertainty is considered (Schmidt 1966).
     pub fn update(&mut self, observation: &WidthObservation, learns: bool) {
         if !self.known {
             self.begin(observation);
@@ -208,6 +214,9 @@ impl WidthModel {
         } else {
             0.0
         };
+        if !self.informs_offset(observation) {
+            (gain.z, gain.w) = (0.0, 0.0);
+        }
         self.state += gain * innovation.by;
         self.covariance = updated_covariance(&self.covariance, &gain, &slopes, noise);
         self.prior.keep_in_range(&mut self.state, &mut self.covariance);
