@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::core::MmPerS;
+use crate::core::{MAX_SILENCE, MmPerS};
 
 /// Largest number of nodes, whatever the length: more than ten minutes at 50 reports a second
 /// with two nodes each.
@@ -95,13 +95,14 @@ impl SpeedHistory {
     }
 
     /// Adds a report: time \[s\], path \[mm\], speed \[mm/s\] and the flow over the one at the
-    /// start speed. A path that falls, or a time that does not grow, clears the history.
+    /// start speed. A path that falls, a time that does not grow, or a silence in which the speed may
+    /// have changed more than once, clears the history.
     pub fn report(&mut self, at_s: f64, path_mm: f64, speed: f64, flow_ratio: f64) {
         let last = self.nodes.back().copied();
         self.flow(flow_ratio, last.map_or(0.0, |last| at_s - last.at_s));
         let before = std::mem::replace(&mut self.speed, speed.max(SLOWEST_MM_PER_S));
         match last {
-            Some(last) if path_mm >= last.path_mm && at_s > last.at_s => {
+            Some(last) if path_mm >= last.path_mm && known_since(last.at_s, at_s) => {
                 self.extend(&last, at_s, path_mm, before);
             }
             _ => {
@@ -226,6 +227,11 @@ impl SpeedHistory {
     }
 }
 
+/// Whether the speed between two reports follows from them.
+fn known_since(last_s: f64, at_s: f64) -> bool {
+    at_s > last_s && at_s - last_s <= MAX_SILENCE.secs()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -319,6 +325,16 @@ mod tests {
         assert!(history.is_empty());
         history.report(10.1, 8.0, 80.0, 1.0);
         assert!((history.mean_over(0.0, 8.0).unwrap().mean - 0.8_f64.ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_was_laid_in_a_silence_has_no_speed() {
+        let mut history = stepped(100.0, 50.0);
+        let end = 103.0 + 50.0 * (3.9 - 1.03);
+        history.report(3.9 + 0.4, end + 20.0, 50.0, 1.0);
+        assert!(history.mean_over(end, end + 20.0).is_some());
+        history.report(4.3 + 0.8, end + 70.0, 50.0, 1.0);
+        assert!(history.is_empty());
     }
 
     #[test]

@@ -297,3 +297,28 @@ fn error_after_mm(run: &Rehearsed, fault: &Fault, settles_within_mm: f64) -> f64
 const SLOWER: f64 = 0.69;
 /// Random stream of the draws. Derived: the bytes of "fault".
 const FAULT_STREAM: u64 = 0x0066_6175_6c74;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    /// The robot goes on at its setpoint. Taken for a speed that changes once, what it did in the
+    /// meantime swung the width by 5 mm afterwards.
+    #[test]
+    fn after_a_silent_link_the_bead_keeps_its_width() {
+        let kind = FaultKind::RobotMute;
+        for cell in LoopCell::ALL {
+            let plan = Plan::new(cell, Control::Distance).unwrap().long(LENGTH_MM);
+            for (seed, lasts_s) in [(0_u32, 0.7), (1, 0.7), (2, 1.0), (3, 1.0)] {
+                let from = Stamp::from_secs(10.0 + 0.037 * f64::from(seed));
+                let fault = Fault { kind, from, until: from + Span::from_secs(lasts_s) };
+                let duration = Span::from_secs(MAX_DURATION_S);
+                let run = plan.rehearse(seed.into(), vec![fault], duration).unwrap();
+                let error_mm = error_after_mm(&run, &fault, 0.0);
+                assert!(error_mm < 0.2, "{cell:?}, {lasts_s} s, seed {seed}: {error_mm}");
+            }
+        }
+    }
+}
