@@ -26,14 +26,14 @@ use crate::calibration::Calibration;
 use crate::cell::Cell;
 use crate::cell::file::RunPart;
 use crate::control::{Controller, Event, Step};
-use crate::core::{Span, Stamp};
+use crate::core::{RobotMode, Span, Stamp};
 use crate::drivers::extruder::DriveRange;
 use crate::link::RobotStatus;
 use crate::link::extruder::on_wire;
 use crate::live::control::{ControlSettings, ControlThread, Ending, ExtruderWatch, Operator};
 use crate::run::ports::{ExtruderPort, RobotPort};
 use crate::run::runner::Runner;
-use crate::sim::cell::{CommandedExtruder, SimCellError};
+use crate::sim::cell::{CommandedExtruder, LayerEnd, Observer, SimCellError};
 use crate::sim::laid::LaidBead;
 
 use disk::Disk;
@@ -50,6 +50,8 @@ pub struct Rehearsal<'a> {
     pub cell: &'a Cell,
     /// Its run part.
     pub run: &'a RunPart,
+    /// The run part that the controller assumes; another one where it is mismatched.
+    pub assumed_run: &'a RunPart,
     /// The calibration of its images.
     pub calibration: &'a Calibration,
     /// The extruder, where one is commanded.
@@ -75,12 +77,30 @@ pub struct Rehearsed {
     pub bead: LaidBead,
 }
 
+impl Rehearsed {
+    /// Shows the events and steps to an observer of a simulated bead until it is done; no frames.
+    pub fn replay(&self, observer: &mut impl Observer) -> LayerEnd {
+        let mut laying = self.robot.iter().filter(|(_, state)| state.mode.lays_bead());
+        let began = laying.next().map_or(Stamp::START, |one| one.0);
+        let ended = laying.next_back().map_or(began, |one| one.0);
+        let done = self.steps.iter().find(|(now, event, step)| {
+            observer.step(*now, event, step);
+            observer.is_done()
+        });
+        let end = RobotMode::after_bead(self.robot.iter().map(|(_, state)| state.mode));
+        LayerEnd {
+            duration: done.map_or(ended, |one| one.0) - began,
+            complete: end == Some(RobotMode::Idle),
+        }
+    }
+}
+
 impl Rehearsal<'_> {
     /// Runs it. Fails if the cell's robot or camera cannot be simulated.
     pub fn run(self) -> Result<Rehearsed, SimCellError> {
-        let Self { cell, run, calibration, extruder, faults, duration } = self;
+        let Self { cell, run, assumed_run, calibration, extruder, faults, duration } = self;
         let faults = Faults(faults);
-        let mut controller = Controller::new(cell.controller_setup(run, calibration));
+        let mut controller = Controller::new(cell.controller_setup(assumed_run, calibration));
         let disk = Disk::new(&faults);
         let (mut watch, mut simulated) = (None, None);
         if let (Some(side), Some(part)) = (extruder, &run.extruder) {

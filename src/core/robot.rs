@@ -30,6 +30,12 @@ impl RobotMode {
     pub fn lays_bead(self) -> bool {
         matches!(self, Self::Print | Self::Hold)
     }
+
+    /// The first mode after a bead: idle where the bead was laid to its end. `None` without a bead, or
+    /// before its end.
+    pub fn after_bead(modes: impl IntoIterator<Item = Self>) -> Option<Self> {
+        modes.into_iter().skip_while(|mode| !mode.lays_bead()).find(|mode| !mode.lays_bead())
+    }
 }
 
 /// One report of the robot.

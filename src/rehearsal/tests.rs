@@ -25,6 +25,7 @@ fn run(cell: &str, path_mm: f64, fault: Option<(FaultKind, f64, f64)>) -> Rehear
     Rehearsal {
         cell: &loaded.cell,
         run: loaded.cell.run.as_ref().unwrap(),
+        assumed_run: loaded.cell.run.as_ref().unwrap(),
         calibration: &loaded.calibration,
         extruder: loaded.simulated_extruder().unwrap().map(|side| side.extruder),
         faults,

@@ -98,7 +98,7 @@ mod tests {
     fn the_bead_has_its_width_soon_after_the_start_and_after_a_step_of_the_flow() {
         for cell in LoopCell::ALL {
             let rows = steps::rows(cell, 6).unwrap();
-            assert_eq!(rows.len(), 7);
+            assert_eq!(rows.len(), 8);
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
             assert!(missed.is_empty(), "{missed:#?}");
         }

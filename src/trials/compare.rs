@@ -113,7 +113,10 @@ impl Figures {
         let judged = |trial: &LayerTrial| trial.control_start_mm + JUDGED_AFTER_MM;
         let rms_by_seed = values(&|trial| trial.rms_error(judged(trial)));
         let firsts = first.map_or(&rms_by_seed, |first| &first.rms_by_seed);
-        let ratios = rms_by_seed.iter().zip(firsts).map(|(ours, first)| ours / first).collect();
+        let ratio = |(ours, first): (&f64, &f64)| {
+            if first.is_finite() { ours / first } else { f64::NAN }
+        };
+        let ratios = rms_by_seed.iter().zip(firsts).map(ratio).collect();
         Ok(Self {
             mean_error_mm: of(&|trial| trial.mean_error(judged(trial))),
             rms_error_mm: SeedStatistics::of(rms_by_seed.clone()),

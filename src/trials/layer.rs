@@ -15,7 +15,7 @@ use crate::sim::laid::LaidBead;
 /// Distance between positions at which the bead is judged \[mm\]: that of the bead's own grid.
 const BEAD_SPACING_MM: f64 = 0.5;
 
-/// A simulated layer.
+/// A simulated layer. Its figures are infinite where the bead was not laid to its end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerTrial {
     /// Measured widths.
@@ -55,18 +55,20 @@ impl LayerTrial {
         cell.simulation.seed = seed + 1;
         let target_mm = run.control.target.nominal().get();
         let mut sim = SimCell::mismatched(&cell, run, factor, calibration.clone(), NoRecorder)?;
-        let score = LayerScore::new(target_mm);
-        let mut watch = StartObserver { score, newest: None, control_start_mm: None };
-        let end = sim.layer(Mm::ZERO, &mut watch);
-        let control_start_mm = watch.control_start_mm.unwrap_or(f64::INFINITY);
-        let path_mm = cell.simulation.path.get();
-        let trial = Self::of_bead(sim.bead(), path_mm, control_start_mm, target_mm);
-        Ok(Self { score: watch.score, complete: end.complete, ..trial })
+        let mut observer = LayerObserver::new(target_mm);
+        let end = sim.layer(Mm::ZERO, &mut observer);
+        Ok(observer.into_trial(sim.bead(), cell.simulation.path.get(), end.complete))
     }
 
     /// A bead of a length that was laid elsewhere, without its measured widths: where control of it
-    /// began, and its target width \[mm\].
-    pub fn of_bead(laid: &LaidBead, length_mm: f64, control_start_mm: f64, target_mm: f64) -> Self {
+    /// began, and its target width \[mm\]; and whether it was laid to its end.
+    pub fn of_bead(
+        laid: &LaidBead,
+        length_mm: f64,
+        control_start_mm: f64,
+        target_mm: f64,
+        complete: bool,
+    ) -> Self {
         let (mut bead, mut smooth) = (Vec::new(), Vec::new());
         let mut at = 0.0;
         while at < length_mm {
@@ -75,7 +77,7 @@ impl LayerTrial {
             at += BEAD_SPACING_MM;
         }
         let score = LayerScore::new(target_mm);
-        Self { score, bead, smooth, control_start_mm, complete: true, target_mm }
+        Self { score, bead, smooth, control_start_mm, complete, target_mm }
     }
 
     /// The same up to a position \[mm\].
@@ -101,11 +103,17 @@ impl LayerTrial {
     fn settles(&self, points: &[BeadPoint], from_mm: f64, band_mm: f64) -> f64 {
         let outside =
             |(at, width): &BeadPoint| *at >= from_mm && (width - self.target_mm).abs() > band_mm;
-        match points.iter().rposition(outside) {
+        let settled = match points.iter().rposition(outside) {
             None if points.last().is_none_or(|(at, _)| *at < from_mm) => f64::INFINITY,
             None => 0.0,
             Some(last) => points.get(last + 1).map_or(f64::INFINITY, |(at, _)| at - from_mm),
-        }
+        };
+        self.if_complete(settled)
+    }
+
+    /// A figure of the bead, if it was laid to its end: what is missing could be anything.
+    const fn if_complete(&self, figure: f64) -> f64 {
+        if self.complete { figure } else { f64::INFINITY }
     }
 
     /// Mean square error of the mean width over pieces of a length, from a position on \[mm²\].
@@ -113,13 +121,13 @@ impl LayerTrial {
         let errors: Vec<f64> = self.errors(from_mm).collect();
         let points = to_count(length_mm / BEAD_SPACING_MM).max(1);
         let mean_over = |piece: &[f64]| mean(piece.iter().copied());
-        mean(errors.windows(points).map(|piece| mean_over(piece).powi(2)))
+        self.if_complete(mean(errors.windows(points).map(|piece| mean_over(piece).powi(2))))
     }
 
     /// Root mean square error of the width without roughness, from a position on \[mm\].
     pub fn smooth_rms_error(&self, from_mm: f64) -> f64 {
         let after = self.smooth.iter().filter(|(at, _)| *at >= from_mm);
-        rms(after.map(|(_, width)| width - self.target_mm))
+        self.if_complete(rms(after.map(|(_, width)| width - self.target_mm)))
     }
 
     /// Integral of the absolute error over the path from a position on \[mm²\]. This and the
@@ -128,23 +136,23 @@ impl LayerTrial {
         if self.errors(from_mm).next().is_none() {
             return f64::NAN;
         }
-        self.errors(from_mm).map(|error| error.abs() * BEAD_SPACING_MM).sum()
+        self.if_complete(self.errors(from_mm).map(|error| error.abs() * BEAD_SPACING_MM).sum())
     }
 
     /// Mean absolute error of the bead from a position on \[mm\].
     pub fn mean_error(&self, from_mm: f64) -> f64 {
-        mean(self.errors(from_mm).map(f64::abs))
+        self.if_complete(mean(self.errors(from_mm).map(f64::abs)))
     }
 
     /// Root mean square of the bead's error from a position on \[mm\].
     pub fn rms_error(&self, from_mm: f64) -> f64 {
-        rms(self.errors(from_mm))
+        self.if_complete(rms(self.errors(from_mm)))
     }
 
     /// Standard deviation of the bead's width from a position on \[mm\].
     pub fn standard_deviation(&self, from_mm: f64) -> f64 {
         let middle = mean(self.errors(from_mm));
-        mean(self.errors(from_mm).map(|error| (error - middle).powi(2))).sqrt()
+        self.if_complete(mean(self.errors(from_mm).map(|error| (error - middle).powi(2))).sqrt())
     }
 
     fn errors(&self, from_mm: f64) -> impl Iterator<Item = f64> {
@@ -153,15 +161,30 @@ impl LayerTrial {
     }
 }
 
-/// Observes the first setpoint that the controller computes.
-struct StartObserver {
+/// Observes a layer, and the first setpoint that the controller computes.
+pub struct LayerObserver {
     score: LayerScore,
     /// Path at the bead's start, the newest report, and its time of arrival.
     newest: Option<(f64, RobotState, Stamp)>,
     control_start_mm: Option<f64>,
 }
 
-impl Observer for StartObserver {
+impl LayerObserver {
+    /// For a target width \[mm\].
+    pub fn new(target_mm: f64) -> Self {
+        Self { score: LayerScore::new(target_mm), newest: None, control_start_mm: None }
+    }
+
+    /// The trial of the bead that was laid, of a length, to its end or not.
+    pub fn into_trial(self, laid: &LaidBead, length_mm: f64, complete: bool) -> LayerTrial {
+        let start_mm = self.control_start_mm.unwrap_or(f64::INFINITY);
+        let target_mm = self.score.target();
+        let trial = LayerTrial::of_bead(laid, length_mm, start_mm, target_mm, complete);
+        LayerTrial { score: self.score, ..trial }
+    }
+}
+
+impl Observer for LayerObserver {
     fn step(&mut self, now: Stamp, event: &Event, step: &Step) {
         self.score.step(now, event, step);
         match event {

@@ -29,6 +29,11 @@ impl LayerScore {
         Self { target: target_mm, ..Self::default() }
     }
 
+    /// The target width \[mm\].
+    pub const fn target(&self) -> f64 {
+        self.target
+    }
+
     /// Mean absolute error over all measured widths \[mm\].
     pub fn mean_error(&self) -> f64 {
         mean(self.errors().map(f64::abs))

@@ -6,19 +6,20 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::bead_figures::{self, BeadFigures, late_rows};
-use super::live::{BEAD_MM, control_start_mm};
-use super::plant::{BAND_MM, Control, Draw, LoopCell, Plan, START_MM, TARGET_MM};
+use super::live::BEAD_MM;
+use super::plant::{
+    BAND_MM, Control, Draw, Execution, LoopCell, Plan, REHEARSED, START_MM, TARGET_MM,
+};
 use super::steps::{STEP_AFTER_MM, STEP_RATIO};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::control::{Hold, State, Step};
-use crate::core::{MAX_SILENCE, Mm, RobotMode, RobotState, Span, Stamp};
+use crate::core::{MAX_SILENCE, Mm, RobotMode, Span, Stamp};
 use crate::numeric::number::to_f64;
 use crate::rehearsal::fault::{Fault, FaultKind};
 use crate::rehearsal::{PAUSE, Rehearsal, Rehearsed};
 use crate::studies::error::ReproduceError;
-use crate::trials::layer::LayerTrial;
 
 /// Length of a bead \[mm\]. Derived: two metres and more after the fault.
 const LENGTH_MM: f64 = 3000.0;
@@ -46,9 +47,6 @@ const WAY_S: f64 = 0.02;
 /// Time for which a robot may keep another speed than its setpoint, and hold for it, before it is
 /// stopped \[s\]: `docs/src/how-to/run-a-cell.md`, § What the controller does.
 const MISMATCH_S: (f64, f64) = (0.5, 2.0);
-
-/// The circumstance of runs in which nothing fails.
-const SOUND: &str = "live, virtual clock";
 
 /// A fault and what has to come of it.
 #[derive(Debug, Clone, Copy)]
@@ -78,23 +76,15 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
 
 /// Runs in which nothing fails.
 fn sound_rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
-    let mut plan = Plan::new(cell, Control::Distance)?.long(BEAD_MM);
+    let plan = Plan::new(cell, Control::Distance)?.long(BEAD_MM);
+    let mut plan = plan.laid(Execution::Rehearsed);
     let flow = &mut plan.cell.simulation.flow;
     (flow.step_at_mm, flow.step_ratio) = (START_MM + STEP_AFTER_MM, STEP_RATIO);
-    let lay = |seed| {
-        let run = plan.rehearse(seed, Vec::new(), Span::from_secs(MAX_DURATION_S))?;
-        let states: Vec<(Stamp, RobotState)> =
-            run.robot.iter().map(|(at, status)| (*at, (*status).into())).collect();
-        let start_mm = control_start_mm(&states).unwrap_or(f64::INFINITY);
-        let trial = LayerTrial::of_bead(&run.bead, BEAD_MM, start_mm, TARGET_MM);
-        Ok(BeadFigures::of(cell, &trial))
-    };
-    let beads: Vec<BeadFigures> =
-        (0..seeds).into_par_iter().map(lay).collect::<Result<_, ReproduceError>>()?;
-    let mut rows = bead_figures::rows(cell, SOUND, &beads)?;
+    let beads = plan.each(seeds, |trial| BeadFigures::of(cell, trial))?;
+    let mut rows = bead_figures::rows(cell, REHEARSED, &beads)?;
     let of_cell: Vec<(LoopCell, BeadFigures)> =
         beads.into_iter().map(|bead| (cell, bead)).collect();
-    rows.extend(late_rows(&String::from(cell), SOUND, &of_cell));
+    rows.extend(late_rows(&String::from(cell), REHEARSED, &of_cell));
     Ok(rows)
 }
 
@@ -175,6 +165,7 @@ pub fn extruder_rows(seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
             let run = Rehearsal {
                 cell: &cell,
                 run,
+                assumed_run: run,
                 calibration: &loaded.calibration,
                 extruder: loaded.simulated_extruder()?.map(|side| side.extruder),
                 faults: vec![fault],
@@ -198,7 +189,7 @@ impl FaultCase {
     }
 
     fn rows(&self, cell: impl Into<String>, runs: &[Judged]) -> Vec<CaseRow> {
-        let (case, cell) = (format!("{SOUND}: {}", self.name), cell.into());
+        let (case, cell) = (Execution::Rehearsed.case(self.name), cell.into());
         let row = |quantity, value, required| {
             CaseRow::new(cell.clone(), &case, quantity, runs.len(), value, required)
         };

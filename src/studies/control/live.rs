@@ -55,12 +55,14 @@ pub fn laid(cell: &Cell, states: &[(Stamp, RobotState)]) -> Option<LayerTrial> {
         follower.observe(*at, state);
     }
     let control_start_mm = control_start_mm(states)?;
-    Some(LayerTrial::of_bead(follower.bead(), BEAD_MM, control_start_mm, TARGET_MM))
+    let end = RobotMode::after_bead(states.iter().map(|one| one.1.mode));
+    let complete = end == Some(RobotMode::Idle);
+    Some(LayerTrial::of_bead(follower.bead(), BEAD_MM, control_start_mm, TARGET_MM, complete))
 }
 
 /// Path of a robot at its last state at the start speed: the first controlled setpoint came after
 /// it \[mm\]. `None` where control never began.
-pub fn control_start_mm(states: &[(Stamp, RobotState)]) -> Option<f64> {
+fn control_start_mm(states: &[(Stamp, RobotState)]) -> Option<f64> {
     let prints = states.iter().map(|one| one.1).filter(|one| one.mode == RobotMode::Print);
     let at_start = |speed: f64| (speed / START_MM_PER_S - 1.0).abs() < CONTROLLED;
     let mut before = prints.skip_while(|one| one.path_mm.get() < 0.9 * START_MM);
@@ -125,6 +127,15 @@ mod tests {
             };
             states.push((Stamp::from_secs(at_s), state));
         }
+        let (at, last) = *states.last().unwrap();
+        for (mode, is_whole) in [(RobotMode::Stop, false), (RobotMode::Idle, true)] {
+            let mut states = states.clone();
+            states.push((at, RobotState { mode, ..last }));
+            let trial = laid(&cell, &states).unwrap();
+            let figures = BeadFigures::of(LoopCell::ALL[0], &trial);
+            assert_eq!(figures.start_mm.is_finite(), is_whole, "{mode:?}: {figures:?}");
+        }
+        states.push((at, RobotState { mode: RobotMode::Idle, ..last }));
         let trial = laid(&cell, &states).unwrap();
         assert!((trial.control_start_mm - 211.5).abs() < 1.2, "{}", trial.control_start_mm);
         // 38.6 mm at the start speed, 42 mm after it, wider after the step of the flow.

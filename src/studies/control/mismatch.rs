@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::plant::{Control, Draw, LoopCell, Plan, TARGET_MM};
+use super::plant::{Control, Draw, Execution, LoopCell, Plan, TARGET_MM};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
@@ -20,27 +20,39 @@ const AMPLITUDE: f64 = 0.01;
 
 /// The rows of a cell.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let mut rows = Vec::new();
+    for execution in Execution::ALL {
+        rows.extend(rows_laid(cell, seeds, execution)?);
+    }
+    Ok(rows)
+}
+
+fn rows_laid(
+    cell: LoopCell,
+    seeds: u64,
+    execution: Execution,
+) -> Result<Vec<CaseRow>, ReproduceError> {
     let drawn = |control| {
         (0..seeds)
             .into_par_iter()
-            .map(|seed| Ok(errors(&drawn_plan(cell, control, seed)?.lay(seed)?)))
+            .map(|seed| Ok(errors(&drawn_plan(cell, control, seed)?.laid(execution).lay(seed)?)))
             .collect::<Result<Vec<f64>, ReproduceError>>()
     };
     let (ours, pi) = (drawn(Control::Distance)?, drawn(Control::Pi)?);
     let (ours_mm, pi_mm) = (quantile(&ours, 0.5), quantile(&pi, 0.5));
-    let all = "offset, exponent, drift and wave drawn";
+    let all = execution.case("offset, exponent, drift and wave drawn");
     let mut rows =
-        vec![CaseRow::new(cell, all, Quantity::mm("RMS, median"), ours.len(), ours_mm, pi_mm)];
+        vec![CaseRow::new(cell, &all, Quantity::mm("RMS, median"), ours.len(), ours_mm, pi_mm)];
     for wavelength_mm in WAVELENGTHS_MM {
         let lay = |control| -> Result<f64, ReproduceError> {
-            let mut plan = Plan::new(cell, control)?.long(LENGTH_MM);
+            let mut plan = Plan::new(cell, control)?.long(LENGTH_MM).laid(execution);
             let flow = &mut plan.cell.simulation.flow;
             (flow.wave_amplitude, flow.wavelength_mm) = (AMPLITUDE, wavelength_mm);
             Ok(quantile(&plan.each(seeds, errors)?, 0.5))
         };
         let open = TARGET_MM * AMPLITUDE / std::f64::consts::SQRT_2;
         let ratio = lay(Control::Distance)? / lay(Control::Pi)?.max(open);
-        let case = format!("wave of {wavelength_mm} mm");
+        let case = execution.case(&format!("wave of {wavelength_mm} mm"));
         rows.push(CaseRow::new(
             cell,
             &case,

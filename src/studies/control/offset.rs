@@ -3,14 +3,12 @@
 use rayon::prelude::*;
 
 use super::laid_length::LaidLength;
-use super::plant::{Control, Draw, LoopCell, Plan};
+use super::plant::{Control, Draw, Execution, LoopCell, Plan};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::control::{Command, Event, Step};
-use crate::core::{Mm, Stamp};
+use crate::core::Stamp;
 use crate::numeric::number::to_f64;
-use crate::run::runner::NoRecorder;
-use crate::sim::cell::{FrameObservation, Observer, SimCell};
-use crate::studies::barjuei2022::scale;
+use crate::sim::cell::{FrameObservation, Observer};
 use crate::studies::error::ReproduceError;
 use crate::width_control::watch::WrongOffset;
 
@@ -27,24 +25,41 @@ const CHANGES: usize = 2;
 
 /// The rows of a cell. Under PI control the offset is not tested.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let mut rows = Vec::new();
+    for execution in Execution::ALL {
+        rows.extend(rows_laid(cell, seeds, execution)?);
+    }
+    Ok(rows)
+}
+
+fn rows_laid(
+    cell: LoopCell,
+    seeds: u64,
+    execution: Execution,
+) -> Result<[CaseRow; 4], ReproduceError> {
     let all: Vec<Warned> = (0..seeds)
         .into_par_iter()
-        .map(|seed| Warned::on(cell, seed))
+        .map(|seed| Warned::on(&plan(cell, seed)?.laid(execution), seed))
         .collect::<Result<_, ReproduceError>>()?;
-    let shown: Vec<&Warned> = all.iter().filter(|one| one.passed_mm().is_some()).collect();
+    let is_shown = |one: &&Warned| one.is_lost() || one.passed_mm().is_some();
+    let shown: Vec<&Warned> = all.iter().filter(is_shown).collect();
     let late = to_f64(shown.iter().filter(|one| one.is_late()).count());
+    let stopped = to_f64(all.iter().filter(|one| !one.complete).count());
     let wrong_side = to_f64(all.iter().filter(|one| one.names_wrong_side()).count());
     let after: Vec<f64> = shown.iter().map(|one| one.after_mm()).collect();
     let row = |quantity, value, required| {
-        CaseRow::new(cell, "offset 20 % wrong", quantity, shown.len(), value, required)
+        let case = execution.case("offset 20 % wrong");
+        CaseRow::new(cell, &case, quantity, shown.len(), value, required)
     };
     let fraction = Quantity::ratio("fraction not noticed in time");
     let noticed = Quantity::mm("noticed after the first change, median");
     let other_side = Quantity::ratio("fraction that names the wrong side");
-    Ok(vec![
+    Ok([
         row(fraction, late / to_f64(shown.len()), 0.05),
         row(other_side, wrong_side / to_f64(all.len()), 0.01),
         row(noticed, quantile(&after, 0.5), f64::INFINITY),
+        // No limit: whether control should go on with a camera that looks elsewhere is open.
+        row(Quantity::ratio("fraction stopped"), stopped / to_f64(all.len()), f64::INFINITY),
     ])
 }
 
@@ -73,15 +88,14 @@ struct Warned {
     noticed_mm: Option<f64>,
     /// The first offset that was found, and the stated one.
     found: Option<WrongOffset>,
+    /// Whether the bead was laid to its end.
+    complete: bool,
 }
 
 impl Warned {
-    fn on(cell: LoopCell, seed: u64) -> Result<Self, ReproduceError> {
-        let plan = plan(cell, seed)?;
-        let mut cell = plan.cell.clone();
-        cell.simulation.seed = seed + 1;
+    fn on(plan: &Plan, seed: u64) -> Result<Self, ReproduceError> {
         let offset_mm = plan.run.camera.offset.get();
-        let seen_within_mm = ERROR * offset_mm + 2.0 * cell.simulation.gauge_length.get();
+        let seen_within_mm = ERROR * offset_mm + 2.0 * plan.cell.simulation.gauge_length.get();
         let mut warned = Self {
             offset_mm,
             seen_within_mm,
@@ -90,10 +104,9 @@ impl Warned {
             changes_mm: Vec::new(),
             noticed_mm: None,
             found: None,
+            complete: false,
         };
-        let factor = plan.assumed_offset;
-        let mut sim = SimCell::mismatched(&cell, &plan.run, factor, scale(), NoRecorder)?;
-        let _ = sim.layer(Mm::ZERO, &mut warned);
+        warned.complete = plan.observe(seed, &mut warned)?.complete;
         Ok(warned)
     }
 
@@ -103,8 +116,13 @@ impl Warned {
         Some(last + self.offset_mm + self.seen_within_mm).filter(|passed| *passed < LENGTH_MM)
     }
 
+    /// Whether it was stopped before anything was noticed.
+    fn is_lost(&self) -> bool {
+        !self.complete && self.noticed_mm.is_none()
+    }
+
     fn is_late(&self) -> bool {
-        self.passed_mm() < self.noticed_mm.or(Some(f64::INFINITY))
+        self.is_lost() || self.passed_mm() < self.noticed_mm.or(Some(f64::INFINITY))
     }
 
     /// Whether the offset that was found lies on the wrong side of the stated one.
@@ -148,3 +166,24 @@ impl Observer for Warned {
 
 /// Random stream of what is drawn. Derived: the bytes of "offset".
 const OFFSET_STREAM: u64 = 0x6f66_6673_6574;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    #[test]
+    fn a_live_run_with_a_wrong_offset_finds_the_one_of_its_camera() {
+        let cell = LoopCell::ALL[1];
+        for factor in [0.8, 1.2] {
+            let mut plan = plan(cell, 0).unwrap().laid(Execution::Rehearsed);
+            plan.assumed_offset = factor;
+            let warned = Warned::on(&plan, 0).unwrap();
+            let WrongOffset { found_mm, stated_mm } = warned.found.unwrap();
+            let camera_mm = plan.run.camera.offset.get();
+            assert!((stated_mm.get() - factor * camera_mm).abs() < 1e-9, "{stated_mm:?}");
+            assert!((found_mm.get() - camera_mm).abs() < 8.0, "{factor}: {found_mm:?}");
+        }
+    }
+}

@@ -9,11 +9,13 @@ use crate::cell::file::{Cell, Purpose, RunPart};
 use crate::core::{Mm, MmPerS, Span};
 use crate::numeric::root::{BISECTIONS, bisect};
 use crate::rehearsal::fault::Fault;
-use crate::rehearsal::{Rehearsal, Rehearsed};
+use crate::rehearsal::{PAUSE, Rehearsal, Rehearsed};
+use crate::run::runner::NoRecorder;
+use crate::sim::cell::{LayerEnd, Observer, SimCell};
 use crate::sim::hash;
 use crate::studies::barjuei2022::scale;
 use crate::studies::error::ReproduceError;
-use crate::trials::layer::LayerTrial;
+use crate::trials::layer::{LayerObserver, LayerTrial};
 use crate::width_control::strategy::constant::ConstantStrategy;
 use crate::width_control::strategy::pi::PiStrategy;
 
@@ -23,6 +25,10 @@ pub const TARGET_MM: f64 = 42.0;
 pub const START_MM: f64 = 200.0;
 /// Error within which a bead has its width \[mm\]: the paper's own band, section 5.
 pub const BAND_MM: f64 = 0.5;
+
+/// Time after the end of a bead until its run is over. Derived: until the last report has arrived,
+/// 20 ms after the robot became idle, with as much to spare as a robot needs to stop.
+const END: Span = Span::from_millis(500);
 
 /// Gauge and rates of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +79,31 @@ pub enum Control {
     None,
 }
 
+/// How the bead of a plan is laid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Execution {
+    /// In the loop of `truebead simulate`.
+    Simulated,
+    /// By the control thread of a live run, on a virtual clock.
+    Rehearsed,
+}
+
+impl Execution {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Simulated, Self::Rehearsed];
+
+    /// The name of a case whose beads are laid so.
+    pub fn case(self, name: &str) -> String {
+        match self {
+            Self::Simulated => name.to_owned(),
+            Self::Rehearsed => format!("{REHEARSED}: {name}"),
+        }
+    }
+}
+
+/// The circumstance of beads that are laid live on a virtual clock.
+pub const REHEARSED: &str = "live, virtual clock";
+
 /// A bead to lay.
 #[derive(Debug, Clone)]
 pub struct Plan {
@@ -82,6 +113,8 @@ pub struct Plan {
     pub run: RunPart,
     /// The offset that the controller assumes, over the true one.
     pub assumed_offset: f64,
+    /// How it is laid.
+    pub execution: Execution,
 }
 
 impl Plan {
@@ -102,7 +135,7 @@ impl Plan {
                 run.control.strategy = Arc::new(ConstantStrategy { speed });
             }
         }
-        Ok(Self { cell: file, run, assumed_offset: 1.0 })
+        Ok(Self { cell: file, run, assumed_offset: 1.0, execution: Execution::Simulated })
     }
 
     /// Sets the length of the bead \[mm\].
@@ -114,6 +147,12 @@ impl Plan {
     /// A bead without roughness.
     pub fn smooth(mut self) -> Self {
         self.cell.simulation.roughness.sigma_mm = 0.0;
+        self
+    }
+
+    /// Sets how it is laid.
+    pub const fn laid(mut self, execution: Execution) -> Self {
+        self.execution = execution;
         self
     }
 
@@ -129,8 +168,50 @@ impl Plan {
 
     /// Lays it with one seed.
     pub fn lay(&self, seed: u64) -> Result<LayerTrial, ReproduceError> {
-        let Self { cell, run, assumed_offset } = self;
-        Ok(LayerTrial::lay_mismatched(cell, run, &scale(), *assumed_offset, seed)?)
+        let Self { cell, run, assumed_offset, execution } = self;
+        match execution {
+            Execution::Simulated => {
+                Ok(LayerTrial::lay_mismatched(cell, run, &scale(), *assumed_offset, seed)?)
+            }
+            Execution::Rehearsed => {
+                let run = self.rehearse(seed, Vec::new(), self.longest())?;
+                let mut observer = LayerObserver::new(TARGET_MM);
+                let end = run.replay(&mut observer);
+                let length_mm = cell.simulation.path.get();
+                Ok(observer.into_trial(&run.bead, length_mm, end.complete))
+            }
+        }
+    }
+
+    /// Lays it with one seed for an observer.
+    pub fn observe(
+        &self,
+        seed: u64,
+        observer: &mut impl Observer,
+    ) -> Result<LayerEnd, ReproduceError> {
+        match self.execution {
+            Execution::Simulated => {
+                let cell = self.with_seed(seed);
+                let (run, factor) = (&self.run, self.assumed_offset);
+                let mut sim = SimCell::mismatched(&cell, run, factor, scale(), NoRecorder)?;
+                Ok(sim.layer(Mm::ZERO, observer))
+            }
+            Execution::Rehearsed => {
+                Ok(self.rehearse(seed, Vec::new(), self.longest())?.replay(observer))
+            }
+        }
+    }
+
+    /// Duration of a run within which the bead is laid, even at its slowest speed.
+    fn longest(&self) -> Span {
+        let slowest_s = self.cell.simulation.path.get() / self.run.limits.min_speed.get();
+        PAUSE + Span::from_secs(slowest_s) + END
+    }
+
+    fn with_seed(&self, seed: u64) -> Cell {
+        let mut cell = self.cell.clone();
+        cell.simulation.seed = seed + 1;
+        cell
     }
 
     /// Lays it with one seed in a live run on a virtual clock, in which something may fail.
@@ -140,10 +221,18 @@ impl Plan {
         faults: Vec<Fault>,
         duration: Span,
     ) -> Result<Rehearsed, ReproduceError> {
-        let (mut cell, run, calibration) = (self.cell.clone(), &self.run, &scale());
-        cell.simulation.seed = seed + 1;
-        let (cell, extruder) = (&cell, None);
-        Ok(Rehearsal { cell, run, calibration, extruder, faults, duration }.run()?)
+        let mut assumed_run = self.run.clone();
+        assumed_run.camera.offset = assumed_run.camera.offset * self.assumed_offset;
+        let rehearsal = Rehearsal {
+            cell: &self.with_seed(seed),
+            run: &self.run,
+            assumed_run: &assumed_run,
+            calibration: &scale(),
+            extruder: None,
+            faults,
+            duration,
+        };
+        Ok(rehearsal.run()?)
     }
 
     /// A number for each seed from 0 on, in parallel.

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::plant::{Control, LoopCell, Plan};
-use super::table::{CaseRow, Quantity, quantile};
+use super::plant::{Control, Execution, LoopCell, Plan};
+use super::table::{CaseRow, Quantity, quantile, ratio};
 use crate::numeric::average::rms;
 use crate::numeric::number::{to_count, to_f64};
 use crate::studies::error::ReproduceError;
@@ -33,19 +33,39 @@ const MIN_SEEN: f64 = 0.4;
 
 /// The rows of a cell.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    let mut rows = Vec::new();
+    for execution in Execution::ALL {
+        rows.extend(steady_rows(cell, seeds, execution)?);
+        rows.extend(pulsating_rows(cell, seeds, execution)?);
+    }
+    Ok(rows)
+}
+
+/// A pump that pulsates. Beads without roughness are simulated only: they say what could be reached.
+fn pulsating_rows(
+    cell: LoopCell,
+    seeds: u64,
+    execution: Execution,
+) -> Result<Vec<CaseRow>, ReproduceError> {
     let row = |case: &str, quantity, ratios: &[f64], fraction, required| {
-        CaseRow::new(cell, case, quantity, ratios.len(), quantile(ratios, fraction), required)
+        let (case, value) = (execution.case(case), quantile(ratios, fraction));
+        CaseRow::new(cell, &case, quantity, ratios.len(), value, required)
     };
     let median = Quantity::ratio("RMS over uncontrolled, median");
     let most = Quantity::ratio("RMS over uncontrolled, 99 %");
     let largest = Quantity::ratio("RMS over uncontrolled, largest");
-    let mut rows = steady_rows(cell, seeds)?;
+    let mut rows = Vec::new();
     let mut of_all = Vec::new();
     for period_s in PERIODS_S {
         let mut ratios = Vec::new();
         for amplitude in AMPLITUDES {
-            ratios.extend(ratios_of(cell, seeds, amplitude, period_s, true)?);
-            let smooth = ratios_of(cell, seeds, amplitude, period_s, false)?;
+            let ours = pulsating(cell, Control::Distance, amplitude, period_s)?.laid(execution);
+            let open = pulsating(cell, Control::None, amplitude, period_s)?.laid(execution);
+            ratios.extend(ratios_of(&ours, &open, seeds)?);
+            if execution == Execution::Rehearsed {
+                continue;
+            }
+            let smooth = ratios_of(&ours.smooth(), &open.smooth(), seeds)?;
             let wave = PI * cell.gauge_mm / (period_s * SPEED_MM_PER_S);
             let seen = (wave.sin() / wave).abs();
             if seen >= MIN_SEEN && period_s * cell.link_hz >= MIN_SETPOINTS {
@@ -63,8 +83,12 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
 }
 
 /// A pump that does not pulsate: what the part that cancels costs.
-fn steady_rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
-    let plan = Plan::new(cell, Control::Distance)?.long(LENGTH_MM);
+fn steady_rows(
+    cell: LoopCell,
+    seeds: u64,
+    execution: Execution,
+) -> Result<[CaseRow; 2], ReproduceError> {
+    let plan = Plan::new(cell, Control::Distance)?.long(LENGTH_MM).laid(execution);
     let mut off = plan.clone();
     if let Some(strategy) = off.run.control.strategy.as_kind::<DistanceStrategy>().copied() {
         let strategy = DistanceStrategy { cancels_pulsation: false, ..strategy };
@@ -73,13 +97,13 @@ fn steady_rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceErro
     let of = |trial: &LayerTrial| (trial.rms_error(JUDGED_FROM_MM), trial.score.speeds.clone());
     let (with, without) = (plan.each(seeds, of)?, off.each(seeds, of)?);
     let pairs = || with.iter().zip(&without);
-    let ratios: Vec<f64> = pairs().map(|(with, without)| with.0 / without.0).collect();
+    let ratios: Vec<f64> = pairs().map(|(with, without)| ratio(with.0, without.0)).collect();
     let added: Vec<f64> =
         pairs().map(|(with, without)| speed_change(&with.1, &without.1)).collect();
     let row = |quantity, value, required| {
-        CaseRow::new(cell, "no pulsation", quantity, with.len(), value, required)
+        CaseRow::new(cell, &execution.case("no pulsation"), quantity, with.len(), value, required)
     };
-    Ok(vec![
+    Ok([
         row(Quantity::percent("speed added, RMS, 99 %"), 100.0 * quantile(&added, 0.99), 0.3),
         row(Quantity::ratio("RMS over that without it, largest"), quantile(&ratios, 1.0), 1.02),
     ])
@@ -96,20 +120,10 @@ fn speed_change(with: &[BeadPoint], without: &[BeadPoint]) -> f64 {
     rms(changes)
 }
 
-fn ratios_of(
-    cell: LoopCell,
-    seeds: u64,
-    amplitude: f64,
-    period_s: f64,
-    rough: bool,
-) -> Result<Vec<f64>, ReproduceError> {
-    let lay = |control| -> Result<Vec<f64>, ReproduceError> {
-        let plan = pulsating(cell, control, amplitude, period_s)?;
-        let plan = if rough { plan } else { plan.smooth() };
-        plan.each(seeds, |trial| trial.rms_error(JUDGED_FROM_MM))
-    };
-    let (ours, open) = (lay(Control::Distance)?, lay(Control::None)?);
-    Ok(ours.iter().zip(&open).map(|(ours, open)| ours / open).collect())
+fn ratios_of(ours: &Plan, open: &Plan, seeds: u64) -> Result<Vec<f64>, ReproduceError> {
+    let lay = |plan: &Plan| plan.each(seeds, |trial| trial.rms_error(JUDGED_FROM_MM));
+    let (ours, open) = (lay(ours)?, lay(open)?);
+    Ok(ours.iter().zip(&open).map(|(ours, open)| ratio(*ours, *open)).collect())
 }
 
 fn pulsating(

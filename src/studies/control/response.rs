@@ -4,16 +4,14 @@
 use rayon::prelude::*;
 
 use super::laid_length::LaidLength;
-use super::plant::{Control, Draw, LoopCell, Plan, TARGET_MM};
+use super::plant::{Control, Draw, Execution, LoopCell, Plan, TARGET_MM};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::control::{Command, Event, Hold, State, Step};
 use crate::core::{Mm, Stamp};
 use crate::numeric::number::to_f64;
-use crate::run::runner::NoRecorder;
 use crate::scenario::disturbance::Flow;
 use crate::scenario::table::OtherBead;
-use crate::sim::cell::{FrameObservation, Observer, SimCell};
-use crate::studies::barjuei2022::scale;
+use crate::sim::cell::{FrameObservation, Observer};
 use crate::studies::error::ReproduceError;
 
 /// Length of a bead \[mm\].
@@ -29,30 +27,36 @@ const THOUSAND_HOURS_S: f64 = 3.6e6;
 /// The rows of a cell.
 pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
-    for (control, name) in [(Control::Distance, "by distance"), (Control::Pi, "by PI")] {
-        rows.extend(fault_rows(cell, &format!("another bead in view, {name}"), seeds, control)?);
-        let sound = observe(seeds, |seed| disturbed(cell, control, seed))?;
+    for (control, execution, name) in [
+        (Control::Distance, Execution::Simulated, "by distance"),
+        (Control::Pi, Execution::Simulated, "by PI"),
+        (Control::Distance, Execution::Rehearsed, "by distance"),
+    ] {
+        let case = execution.case(&format!("another bead in view, {name}"));
+        let faulty =
+            observe(seeds, |seed| Ok(with_other_bead(cell, control, seed)?.laid(execution)))?;
+        rows.extend(fault_rows(cell, &case, &faulty)?);
+        let case = execution.case(&format!("no fault, {name}"));
+        let sound = observe(seeds, |seed| Ok(disturbed(cell, control, seed)?.laid(execution)))?;
         let alarms: Vec<CaseRow> = (0..seeds)
             .zip(&sound)
-            .filter_map(|(seed, one)| {
-                alarm_row(cell, &format!("no fault, {name}, seed {seed}"), one)
-            })
+            .filter_map(|(seed, one)| alarm_row(cell, &format!("{case}, seed {seed}"), one))
             .collect();
         let lasted_s: f64 = sound.iter().map(|one| one.lasted_s).sum();
         let value = THOUSAND_HOURS_S * to_f64(alarms.len()) / lasted_s;
         let quantity = Quantity::ratio("false alarms in 1,000 h");
-        let case = format!("no fault, {name}");
         rows.push(CaseRow::new(cell, &case, quantity, sound.len(), value, 10.0));
         rows.extend(alarms);
     }
     Ok(rows)
 }
 
-/// Where on a bead without a fault control held or warned.
+/// Where on a bead without a fault control held, warned or stopped.
 fn alarm_row(cell: LoopCell, case: &str, noticed: &Noticed) -> Option<CaseRow> {
     let (what, path_mm) = match (noticed.held_mm, noticed.warned_mm) {
         (Some(path_mm), _) => ("held: no response", path_mm),
         (None, Some(path_mm)) => ("warned: wrong offset", path_mm),
+        (None, None) if !noticed.complete => ("stopped", noticed.laid.path_mm),
         (None, None) => return None,
     };
     Some(CaseRow::new(cell, case, Quantity::mm(what), 1, path_mm, f64::INFINITY))
@@ -61,11 +65,10 @@ fn alarm_row(cell: LoopCell, case: &str, noticed: &Noticed) -> Option<CaseRow> {
 fn fault_rows(
     cell: LoopCell,
     case: &str,
-    seeds: u64,
-    control: Control,
+    faulty: &[Noticed],
 ) -> Result<[CaseRow; 2], ReproduceError> {
-    let most_mm = Plan::new(cell, control)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
-    let faulty = observe(seeds, |seed| with_other_bead(cell, control, seed))?;
+    let most_mm =
+        Plan::new(cell, Control::Distance)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
     // Where the speed hardly changes, there is nothing that the width could answer.
     let after: Vec<f64> = faulty.iter().filter_map(Noticed::after_mm).collect();
     let late = after.iter().filter(|after| **after > most_mm).count();
@@ -130,17 +133,17 @@ struct Noticed {
     /// Where the offset was called wrong.
     warned_mm: Option<f64>,
     lasted_s: f64,
+    /// Whether the bead was laid to its end.
+    complete: bool,
 }
 
 impl Noticed {
     fn on(plan: &Plan, seed: u64) -> Result<Self, ReproduceError> {
-        let mut cell = plan.cell.clone();
-        cell.simulation.seed = seed + 1;
-        let other = cell.simulation.other_bead;
+        let other = plan.cell.simulation.other_bead;
         let fault_from_mm = other.map_or(f64::INFINITY, |other| other.from.get());
         let mut noticed = Self { fault_from_mm, ..Self::default() };
-        let mut sim = SimCell::new(&cell, &plan.run, scale(), NoRecorder)?;
-        noticed.lasted_s = sim.layer(Mm::ZERO, &mut noticed).duration.secs();
+        let end = plan.observe(seed, &mut noticed)?;
+        (noticed.lasted_s, noticed.complete) = (end.duration.secs(), end.complete);
         Ok(noticed)
     }
 
@@ -183,3 +186,23 @@ impl Observer for Noticed {
 
 /// Random stream of what is drawn. Derived: the bytes of "response".
 const RESPONSE_STREAM: u64 = 0x7265_7370_6f6e_7365;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    #[test]
+    fn a_bead_that_the_controller_stops_has_no_error_and_never_settles() {
+        for execution in Execution::ALL {
+            let plan = with_other_bead(LoopCell::ALL[1], Control::Distance, 0).unwrap();
+            let trial = plan.laid(execution).lay(0).unwrap();
+            assert!(!trial.complete && trial.smooth.len() > 1000, "{execution:?}");
+            let settled_mm = trial.smooth_settles_within(trial.control_start_mm, 500.0, 0.5);
+            for figure in [settled_mm, trial.rms_error(300.0), trial.smooth_rms_error(300.0)] {
+                assert_eq!(figure, f64::INFINITY, "{execution:?}");
+            }
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! From the width of the start speed to the target, and steps of the flow.
 
-use super::plant::{BAND_MM, Control, LoopCell, Plan};
+use super::plant::{BAND_MM, Control, Execution, LoopCell, Plan};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::numeric::average::mean;
 use crate::studies::error::ReproduceError;
@@ -26,7 +26,9 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
     let plan = Plan::new(cell, Control::Distance)?;
     let mut rows = start_rows(cell, &plan, seeds)?;
     rows.extend(more_flow_rows(cell, &plan, seeds)?);
-    rows.push(less_flow_row(cell, plan, seeds)?);
+    for execution in Execution::ALL {
+        rows.push(less_flow_row(cell, plan.clone().laid(execution), seeds)?);
+    }
     Ok(rows)
 }
 
@@ -86,8 +88,8 @@ fn less_flow_row(cell: LoopCell, plan: Plan, seeds: u64) -> Result<CaseRow, Repr
     let flow = &mut plan.cell.simulation.flow;
     (flow.step_at_mm, flow.step_until_mm, flow.step_ratio) = (at, until, 0.92);
     let settled = plan.each(seeds, |trial| settled_after(trial, until))?;
-    let value = quantile(&settled, 0.95);
-    Ok(CaseRow::new(cell, "flow −8 %", Quantity::mm("settled, 95 %"), settled.len(), value, 150.0))
+    let (case, value) = (plan.execution.case("flow −8 %"), quantile(&settled, 0.95));
+    Ok(CaseRow::new(cell, &case, Quantity::mm("settled, 95 %"), settled.len(), value, 150.0))
 }
 
 fn settled_after(trial: &LayerTrial, at_mm: f64) -> f64 {

@@ -88,9 +88,17 @@ impl CaseRow {
     }
 }
 
-/// The value at a fraction of the way from the smallest to the largest; infinite values count.
+/// The value at a fraction of the way from the smallest to the largest; infinite values count, and
+/// what is not a number counts as infinite.
 pub fn quantile(values: &[f64], fraction: f64) -> f64 {
-    rank::quantile(&mut values.to_vec(), fraction).unwrap_or(f64::NAN)
+    let known = |value: &f64| if value.is_nan() { f64::INFINITY } else { *value };
+    let mut values: Vec<f64> = values.iter().map(known).collect();
+    rank::quantile(&mut values, fraction).unwrap_or(f64::NAN)
+}
+
+/// A figure over that of another bead; infinite where the other one was not reached.
+pub const fn ratio(figure: f64, other: f64) -> f64 {
+    if other.is_finite() { figure / other } else { f64::INFINITY }
 }
 
 /// The rows as plain text.
