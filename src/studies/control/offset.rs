@@ -58,7 +58,6 @@ fn rows_laid(
         row(fraction, late / to_f64(shown.len()), 0.05),
         row(other_side, wrong_side / to_f64(all.len()), 0.01),
         row(noticed, quantile(&after, 0.5), f64::INFINITY),
-        // No limit: whether control should go on with a camera that looks elsewhere is open.
         row(Quantity::ratio("fraction stopped"), stopped / to_f64(all.len()), f64::INFINITY),
     ])
 }
@@ -184,6 +183,16 @@ mod tests {
             let camera_mm = plan.run.camera.offset.get();
             assert!((stated_mm.get() - factor * camera_mm).abs() < 1e-9, "{stated_mm:?}");
             assert!((found_mm.get() - camera_mm).abs() < 8.0, "{factor}: {found_mm:?}");
+        }
+    }
+
+    /// The answer to a step of the flow came later than where the camera was said to look.
+    #[test]
+    fn a_bead_goes_on_once_it_is_known_where_its_camera_looks() {
+        for (cell, seed) in [(0, 10), (0, 11), (0, 20), (1, 2), (1, 9), (1, 10)] {
+            let plan = plan(LoopCell::ALL[cell], seed).unwrap().laid(Execution::Rehearsed);
+            let warned = Warned::on(&plan, seed).unwrap();
+            assert!(warned.complete && warned.found.is_some(), "cell {cell}, {seed}: {warned:?}");
         }
     }
 }

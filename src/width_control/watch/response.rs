@@ -54,7 +54,7 @@ pub struct NoResponse {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseTest {
     offset_mm: f64,
-    gauge_mm: f64,
+    gauge: Mm,
     /// Variance of ln w of a width by the roughness.
     roughness: f64,
     /// The latest widths, oldest first, over the path on which an answer is looked for.
@@ -79,10 +79,10 @@ impl ResponseTest {
     /// Before the first width: the camera's offset, the length of the gauge, and the variance of ln w
     /// by the roughness over it; and whether places at which the camera cannot look are excluded.
     pub fn new(offset: Mm, gauge: Mm, roughness: f64, excludes_offsets: bool) -> Self {
-        let (offset_mm, gauge_mm) = (offset.get(), gauge.get());
+        let offset_mm = offset.get();
         let (widths, changes) = (VecDeque::new(), VecDeque::new());
-        let offsets = PlausibleOffsets::new(offset_mm, gauge_mm, roughness);
-        Self { offset_mm, gauge_mm, roughness, widths, changes, offsets, excludes_offsets }
+        let offsets = PlausibleOffsets::new(offset_mm, gauge.get(), roughness);
+        Self { offset_mm, gauge, roughness, widths, changes, offsets, excludes_offsets }
     }
 
     /// A new bead, or one that goes on elsewhere.
@@ -92,18 +92,26 @@ impl ResponseTest {
         self.offsets.clear();
     }
 
-    /// A width of the bead about a position, by the stated offset, and its target. Returns the change
-    /// of the speed that has had no effect, where there is one.
+    /// The camera looks at another place than was known; nothing changes if it is the same.
+    pub fn look_at(&mut self, offset: Mm) {
+        if offset.get() != self.offset_mm {
+            *self = Self::new(offset, self.gauge, self.roughness, self.excludes_offsets);
+        }
+    }
+
+    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and its target. Returns
+    /// the change of the speed that has had no effect, where there is one.
     pub fn measured(
         &mut self,
         speeds: &SpeedHistory,
-        position_mm: f64,
+        nozzle_path: Mm,
         reading: WidthReading,
         target: Mm,
     ) -> Option<NoResponse> {
         if target <= Mm::ZERO {
             return None;
         }
+        let position_mm = nozzle_path.get() - self.offset_mm;
         let newest = self.offsets.matched(speeds, position_mm, reading.width)?;
         let before = self.widths.back().map(|last| last.position_mm);
         if before.is_some_and(|before| before >= newest.position_mm) {
@@ -136,7 +144,7 @@ impl ResponseTest {
     /// Path within which a change of the speed is seen whole, wherever the camera looks within its
     /// error \[mm\].
     fn span_mm(&self) -> f64 {
-        2.0 * LARGEST_ERROR * self.offset_mm + self.gauge_mm
+        2.0 * LARGEST_ERROR * self.offset_mm + self.gauge.get()
     }
 
     fn remember(&mut self, oldest: &MatchedWidth, newest: &MatchedWidth) {
