@@ -89,15 +89,13 @@ impl BeadWatch {
         if reading.width <= Mm::ZERO {
             return Findings::default();
         }
-        let stated_mm = (nozzle_path - self.offset).get();
-        let wrong_offset = self
-            .offset_test
-            .as_mut()
-            .and_then(|test| test.measured(&self.speeds, stated_mm, reading));
-        if let Some(wrong) = wrong_offset {
-            self.response.look_at(wrong.found_mm);
+        let position_mm = (nozzle_path - self.offset).get();
+        Findings {
+            no_response: self.response.measured(&self.speeds, position_mm, reading, target),
+            wrong_offset: self
+                .offset_test
+                .as_mut()
+                .and_then(|test| test.measured(&self.speeds, position_mm, reading)),
         }
-        let no_response = self.response.measured(&self.speeds, nozzle_path, reading, target);
-        Findings { no_response, wrong_offset }
     }
 }

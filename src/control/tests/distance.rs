@@ -140,8 +140,10 @@ fn control_waits_until_the_bead_fills_the_gauge() {
     let mut line = Line::of(setup);
     line.now = 1.0;
     let _ = line.robot(RobotMode::Print, 0.0, 112.5);
-    line.now = 1.8;
-    let _ = line.robot(RobotMode::Print, 90.0, 112.5);
+    for tenth in 11..=18 {
+        line.now = 0.1 * f64::from(tenth);
+        let _ = line.robot(RobotMode::Print, 112.5 * (line.now - 1.0), 112.5);
+    }
     let step = line.width(38.6);
     assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Priming, None));
     line.now = 2.0;

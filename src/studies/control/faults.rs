@@ -307,7 +307,8 @@ mod tests {
                 let fault = Fault { kind, from, until: from + Span::from_secs(lasts_s) };
                 let duration = Span::from_secs(MAX_DURATION_S);
                 let run = plan.rehearse(seed.into(), vec![fault], duration).unwrap();
-                let error_mm = error_after_mm(&run, &fault, 0.0);
+                // Until then the robot may keep its hold speed: it has no valid setpoint.
+                let error_mm = error_after_mm(&run, &fault, 30.0);
                 assert!(error_mm < 0.2, "{cell:?}, {lasts_s} s, seed {seed}: {error_mm}");
             }
         }

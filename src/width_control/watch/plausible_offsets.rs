@@ -10,11 +10,13 @@ use crate::core::Mm;
 use crate::width_control::speed_history::SpeedHistory;
 
 /// Error of the offset up to which an answer may come sooner or later, as a fraction of it. Derived:
-/// two standard deviations where the cell states none.
-pub const LARGEST_ERROR: f64 = 0.2;
+/// a camera that is a quarter farther back than stated is stated a fifth too near.
+const LARGEST_ERROR: f64 = 0.25;
+/// The same where no place is excluded. Derived: two standard deviations where the cell states none.
+const LARGEST_ERROR_OF_ALL: f64 = 0.2;
 /// Errors that are tried to either side of none. Derived: [`LARGEST_ERROR`] over [`STEP`].
-const STEPS: usize = 4;
-/// From one of them to the next. Derived: a quarter of the largest one, a third of a gauge of 12.7 mm that
+const STEPS: usize = 5;
+/// From one of them to the next. Derived: a fifth of the largest one, a third of a gauge of 12.7 mm that
 /// is 88.4 mm behind the nozzle.
 const STEP: f64 = 0.05;
 /// Errors that are tried, from the nearest place to the farthest.
@@ -73,6 +75,8 @@ pub struct PlausibleOffsets {
     gauge_mm: f64,
     /// Variance of ln w by the roughness over a gauge.
     roughness: f64,
+    /// Whether bead that has answered excludes places.
+    excludes: bool,
     last: Option<MatchedWidth>,
     /// Changes that are compared.
     count: f64,
@@ -92,16 +96,22 @@ struct Sums {
 }
 
 impl PlausibleOffsets {
-    /// Before the first width: the camera's offset and the length of the gauge \[mm\], and the variance of
-    /// ln w by the roughness over it.
-    pub fn new(offset_mm: f64, gauge_mm: f64, roughness: f64) -> Self {
-        let sums = [Sums::default(); TRIED];
-        Self { offset_mm, gauge_mm, roughness, last: None, count: 0.0, width_squares: 0.0, sums }
+    /// Before the first width: the camera's offset and the length of the gauge \[mm\], the variance of
+    /// ln w by the roughness over it, and whether bead that has answered excludes places.
+    pub fn new(offset_mm: f64, gauge_mm: f64, roughness: f64, excludes: bool) -> Self {
+        let (count, width_squares, sums) = (0.0, 0.0, [Sums::default(); TRIED]);
+        Self { offset_mm, gauge_mm, roughness, excludes, last: None, count, width_squares, sums }
+    }
+
+    /// Path within which a change of the speed is seen whole, wherever the camera looks \[mm\].
+    pub fn span_mm(&self) -> f64 {
+        let largest = if self.excludes { LARGEST_ERROR } else { LARGEST_ERROR_OF_ALL };
+        2.0 * largest * self.offset_mm + self.gauge_mm
     }
 
     /// A new bead.
     pub fn clear(&mut self) {
-        *self = Self::new(self.offset_mm, self.gauge_mm, self.roughness);
+        *self = Self::new(self.offset_mm, self.gauge_mm, self.roughness, self.excludes);
     }
 
     /// A width about a position \[mm\], by the stated offset; `None` where no speed is known there.
@@ -124,6 +134,9 @@ impl PlausibleOffsets {
 
     /// Adds a width; one that is close to the last is left out.
     pub fn add(&mut self, one: &MatchedWidth) {
+        if !self.excludes {
+            return;
+        }
         let Some(last) = self.last else {
             self.last = Some(*one);
             return;
@@ -151,6 +164,9 @@ impl PlausibleOffsets {
     /// The errors that are not excluded, and one more to either side: the true one lies between two that
     /// are tried.
     pub fn plausible(&self) -> Range<usize> {
+        if !self.excludes {
+            return 1..TRIED - 1;
+        }
         if self.count == 0.0 {
             return 0..TRIED;
         }
@@ -180,7 +196,7 @@ mod tests {
 
     #[test]
     fn changes_of_one_kind_exclude_no_more_by_being_many() {
-        let mut offsets = PlausibleOffsets::new(88.4, 12.7, 2.6e-6);
+        let mut offsets = PlausibleOffsets::new(88.4, 12.7, 2.6e-6, true);
         for number in 0..400_u32 {
             let [nearest, other] = hash::normal_pair(hash::mix(&[1, u64::from(number)]));
             let [flow, _] = hash::normal_pair(hash::mix(&[2, u64::from(number)]));

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::plausible_offsets::{LARGEST_ERROR, MatchedWidth, PlausibleOffsets};
+use super::plausible_offsets::{MatchedWidth, PlausibleOffsets};
 use crate::core::{Mm, MmPerS};
 use crate::numeric::rank;
 use crate::width_control::distance::WidthReading;
@@ -53,8 +53,6 @@ pub struct NoResponse {
 /// The test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseTest {
-    offset_mm: f64,
-    gauge: Mm,
     /// Variance of ln w of a width by the roughness.
     roughness: f64,
     /// The latest widths, oldest first, over the path on which an answer is looked for.
@@ -63,8 +61,6 @@ pub struct ResponseTest {
     changes: VecDeque<Change>,
     /// Where the camera may look, by the bead before that path.
     offsets: PlausibleOffsets,
-    /// Whether bead that has answered excludes places.
-    excludes_offsets: bool,
 }
 
 /// Change of ln w and of ln v from one width to another.
@@ -79,10 +75,10 @@ impl ResponseTest {
     /// Before the first width: the camera's offset, the length of the gauge, and the variance of ln w
     /// by the roughness over it; and whether places at which the camera cannot look are excluded.
     pub fn new(offset: Mm, gauge: Mm, roughness: f64, excludes_offsets: bool) -> Self {
-        let offset_mm = offset.get();
         let (widths, changes) = (VecDeque::new(), VecDeque::new());
-        let offsets = PlausibleOffsets::new(offset_mm, gauge.get(), roughness);
-        Self { offset_mm, gauge, roughness, widths, changes, offsets, excludes_offsets }
+        let (offset_mm, gauge_mm) = (offset.get(), gauge.get());
+        let offsets = PlausibleOffsets::new(offset_mm, gauge_mm, roughness, excludes_offsets);
+        Self { roughness, widths, changes, offsets }
     }
 
     /// A new bead, or one that goes on elsewhere.
@@ -92,26 +88,18 @@ impl ResponseTest {
         self.offsets.clear();
     }
 
-    /// The camera looks at another place than was known; nothing changes if it is the same.
-    pub fn look_at(&mut self, offset: Mm) {
-        if offset.get() != self.offset_mm {
-            *self = Self::new(offset, self.gauge, self.roughness, self.excludes_offsets);
-        }
-    }
-
-    /// A width of a frame that was captured with the nozzle at `nozzle_path`, and its target. Returns
-    /// the change of the speed that has had no effect, where there is one.
+    /// A width of the bead about a position, by the stated offset, and its target. Returns the change
+    /// of the speed that has had no effect, where there is one.
     pub fn measured(
         &mut self,
         speeds: &SpeedHistory,
-        nozzle_path: Mm,
+        position_mm: f64,
         reading: WidthReading,
         target: Mm,
     ) -> Option<NoResponse> {
         if target <= Mm::ZERO {
             return None;
         }
-        let position_mm = nozzle_path.get() - self.offset_mm;
         let newest = self.offsets.matched(speeds, position_mm, reading.width)?;
         let before = self.widths.back().map(|last| last.position_mm);
         if before.is_some_and(|before| before >= newest.position_mm) {
@@ -122,15 +110,13 @@ impl ResponseTest {
         while self
             .widths
             .front()
-            .is_some_and(|one| newest.position_mm - one.position_mm > self.span_mm())
+            .is_some_and(|one| newest.position_mm - one.position_mm > self.offsets.span_mm())
         {
             oldest = self.widths.pop_front();
         }
         let oldest = oldest?;
         self.widths.push_front(oldest);
-        if self.excludes_offsets {
-            self.offsets.add(&oldest);
-        }
+        self.offsets.add(&oldest);
         let found = self.compare(&oldest, &newest, reading, target).map(|over_mm| NoResponse {
             speed_change: libm::expm1(newest.ln_speed() - oldest.ln_speed()),
             width_change: libm::expm1(newest.ln_width - oldest.ln_width),
@@ -139,12 +125,6 @@ impl ResponseTest {
         });
         self.remember(&oldest, &newest);
         found
-    }
-
-    /// Path within which a change of the speed is seen whole, wherever the camera looks within its
-    /// error \[mm\].
-    fn span_mm(&self) -> f64 {
-        2.0 * LARGEST_ERROR * self.offset_mm + self.gauge.get()
     }
 
     fn remember(&mut self, oldest: &MatchedWidth, newest: &MatchedWidth) {
