@@ -58,6 +58,12 @@ impl Controller {
                 self.printing(now, at, state, before);
             }
             RobotMode::Hold => {
+                if jump.is_some() {
+                    self.begin_again(state.path_mm);
+                }
+                if self.phase.bead().is_some() && !self.robot.is_another_bead {
+                    self.bead_laid(now, at, state);
+                }
                 self.robot.speed_monitor.reset();
                 self.phase.hold(now, Hold::RobotHolds);
             }
@@ -108,16 +114,7 @@ impl Controller {
         if self.phase == Phase::Idle {
             self.begin_bead(state, before);
         }
-        self.bead.laid = state.path_mm - self.bead.start;
-        let (path, speed) = (state.path_mm, state.speed_mm_per_s);
-        let report = BeadReport { at, path, speed, flow_ratio: self.flow_ratio(now) };
-        if self.robot.odometer.reports_no_path() {
-            self.width.path_is_estimated();
-        }
-        self.width.robot_reported(&report);
-        if let Some(watch) = &mut self.watch {
-            watch.reported(&report);
-        }
+        self.bead_laid(now, at, state);
         let Some(bead) = self.phase.bead_mut() else { return };
         let requested = bead.setpoint.map_or(self.setup.cell.start_speed, |last| last.speed);
         if bead.stage == BeadStage::RunUp && state.speed_mm_per_s >= requested * RUN_UP_FRACTION {
@@ -134,6 +131,20 @@ impl Controller {
             SpeedMatch::Mismatch => self.phase.hold(now, Hold::SpeedMismatch),
             _ if bead.waits_for_robot() => self.resume(now, state),
             _ => {}
+        }
+    }
+
+    /// Bead is laid at the reported speed, whoever has set it.
+    fn bead_laid(&mut self, now: Stamp, at: Stamp, state: &RobotState) {
+        self.bead.laid = state.path_mm - self.bead.start;
+        let (path, speed) = (state.path_mm, state.speed_mm_per_s);
+        let report = BeadReport { at, path, speed, flow_ratio: self.flow_ratio(now) };
+        if self.robot.odometer.reports_no_path() {
+            self.width.path_is_estimated();
+        }
+        self.width.robot_reported(&report);
+        if let Some(watch) = &mut self.watch {
+            watch.reported(&report);
         }
     }
 

@@ -96,8 +96,8 @@ pub fn read(root: &Table<'_>) -> Option<Simulation> {
     let keys = |name| Some(Keys { table: root.table_or_empty(name)?, failed: Cell::new(false) });
     let (bead, render, world) = (keys("bead")?, keys("render")?, keys("simulation")?);
     let sources = [("frames", WidthSource::Frames), ("widths", WidthSource::Widths)];
-    let step_ms = world.number("step_ms", 0.1..=1000.0, 20.0);
-    let report_ms = world.table.optional_number("report_ms", 1.0..=1000.0);
+    let step_ms = world.number("step_ms", 0.1..=500.0, 20.0);
+    let report_ms = world.table.optional_number("report_ms", 1.0..=500.0);
     let spacing = render.table.optional_number("frame_spacing_mm", 1e-3..=1e5);
     let simulation = Simulation {
         seed: world.or(world.table.integer_or("seed", 0..=u64::MAX >> 1, 1), 1),

@@ -15,7 +15,8 @@ use crate::sim::laid::LaidBead;
 /// Distance between positions at which the bead is judged \[mm\]: that of the bead's own grid.
 const BEAD_SPACING_MM: f64 = 0.5;
 
-/// A simulated layer. Its figures are infinite where the bead was not laid to its end.
+/// A simulated layer. The figures of its bead are infinite where it was not laid to its end; those of
+/// its score are of what was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayerTrial {
     /// Measured widths.
@@ -131,7 +132,7 @@ impl LayerTrial {
     }
 
     /// Integral of the absolute error over the path from a position on \[mm²\]. This and the
-    /// following figures are NaN if there is no bead.
+    /// following figures are NaN if there is no bead from there on.
     pub fn error_integral(&self, from_mm: f64) -> f64 {
         if self.errors(from_mm).next().is_none() {
             return f64::NAN;

@@ -159,7 +159,10 @@ impl DistanceController {
     /// A robot report: path of the nozzle and speed. The bead is as wide as one laid at
     /// `speed / flow_ratio`.
     pub fn reported(&mut self, at: Stamp, path: Mm, speed: MmPerS, flow_ratio: f64) {
-        self.speed_history.report(at.secs(), path.get(), speed.get(), flow_ratio);
+        let (at_s, path_mm) = (at.secs(), path.get());
+        if !self.speed_history.report(at_s, path_mm, speed.get(), flow_ratio) {
+            self.unmatched_since_mm = None;
+        }
     }
 
     /// The extruder reported the speed of its screw.

@@ -96,18 +96,20 @@ impl SpeedHistory {
 
     /// Adds a report: time \[s\], path \[mm\], speed \[mm/s\] and the flow over the one at the
     /// start speed. A path that falls, a time that does not grow, or a silence in which the speed may
-    /// have changed more than once, clears the history.
-    pub fn report(&mut self, at_s: f64, path_mm: f64, speed: f64, flow_ratio: f64) {
+    /// have changed more than once, clears the history. Returns whether it goes on.
+    pub fn report(&mut self, at_s: f64, path_mm: f64, speed: f64, flow_ratio: f64) -> bool {
         let last = self.nodes.back().copied();
         self.flow(flow_ratio, last.map_or(0.0, |last| at_s - last.at_s));
         let before = std::mem::replace(&mut self.speed, speed.max(SLOWEST_MM_PER_S));
         match last {
             Some(last) if path_mm >= last.path_mm && known_since(last.at_s, at_s) => {
                 self.extend(&last, at_s, path_mm, before);
+                true
             }
             _ => {
                 self.clear();
                 self.nodes.push_back(Node { path_mm, at_s, sums: [0.0; 3] });
+                false
             }
         }
     }

@@ -71,6 +71,11 @@ impl BeadWatch {
     /// A new bead, or one that goes on elsewhere.
     pub fn begin_bead(&mut self) {
         self.speeds.clear();
+        self.begin_again();
+    }
+
+    /// What was seen before says nothing about the widths from now on.
+    fn begin_again(&mut self) {
         self.response.begin_bead();
         if let Some(test) = &mut self.offset_test {
             test.begin_bead();
@@ -80,7 +85,10 @@ impl BeadWatch {
     /// The robot reported while it lays bead.
     pub fn reported(&mut self, report: &BeadReport) {
         let BeadReport { at, path, speed, flow_ratio } = *report;
-        self.speeds.report(at.secs(), path.get(), speed.get(), flow_ratio);
+        let goes_on = self.speeds.report(at.secs(), path.get(), speed.get(), flow_ratio);
+        if !goes_on {
+            self.begin_again();
+        }
     }
 
     /// A width of a frame that was captured with the nozzle at `nozzle_path`, and the target width

@@ -1,7 +1,7 @@
 //! Control by distance, event by event.
 
 use super::*;
-use crate::width_control::distance::FallbackReason;
+use crate::width_control::distance::{FallbackReason, WidthUse};
 use crate::width_control::strategy::distance::DistanceStrategy;
 use crate::width_control::target::Knot;
 
@@ -150,6 +150,24 @@ fn control_waits_until_the_bead_fills_the_gauge() {
     let _ = line.robot(RobotMode::Print, 112.5, 112.5);
     let step = line.width(38.6);
     assert_eq!((step.state, step.trace.integral_mm_per_s), (State::Tracking, None));
+}
+
+/// It was forgotten: the widths of the offset after a hold had no speed, and moved nothing.
+#[test]
+fn bead_that_the_robot_lays_at_its_hold_speed_was_laid_at_a_known_speed() {
+    let mut cell = Cell::new(by_distance());
+    let _ = cell.until(300.0);
+    for _ in 0..16 {
+        cell.laid.push((cell.path, Cell::width_at(112.5)));
+        cell.path += 112.5 * STEP_S;
+        cell.line.now += STEP_S;
+        let _ = cell.line.robot(RobotMode::Hold, cell.path, 112.5);
+    }
+    cell.speed = 112.5;
+    for _ in 0..30 {
+        let trace = cell.step().trace.distance.unwrap();
+        assert_eq!(trace.use_of_width, WidthUse::Taken, "at {} mm", cell.path);
+    }
 }
 
 #[test]

@@ -295,8 +295,8 @@ mod tests {
 
     use super::*;
 
-    /// The robot goes on at its setpoint. Taken for a speed that changes once, what it did in the
-    /// meantime swung the width by 5 mm afterwards.
+    /// Taken for a speed that changes once, what the robot did in the meantime swung the width by 5 mm
+    /// afterwards.
     #[test]
     fn after_a_silent_link_the_bead_keeps_its_width() {
         let kind = FaultKind::RobotMute;
@@ -309,7 +309,7 @@ mod tests {
                 let run = plan.rehearse(seed.into(), vec![fault], duration).unwrap();
                 // Until then the robot may keep its hold speed: it has no valid setpoint.
                 let error_mm = error_after_mm(&run, &fault, 30.0);
-                assert!(error_mm < 0.2, "{cell:?}, {lasts_s} s, seed {seed}: {error_mm}");
+                assert!(error_mm < BAND_MM, "{cell:?}, {lasts_s} s, seed {seed}: {error_mm}");
             }
         }
     }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::plant::{Control, Draw, Execution, LoopCell, Plan, TARGET_MM};
-use super::table::{CaseRow, Quantity, quantile};
+use super::table::{CaseRow, Quantity, quantile, ratio};
 use crate::studies::error::ReproduceError;
 use crate::trials::layer::LayerTrial;
 
@@ -40,9 +40,11 @@ fn rows_laid(
     };
     let (ours, pi) = (drawn(Control::Distance)?, drawn(Control::Pi)?);
     let (ours_mm, pi_mm) = (quantile(&ours, 0.5), quantile(&pi, 0.5));
+    // A PI controller that does not lay the bead is no measure.
+    let required = if pi_mm.is_finite() { pi_mm } else { 0.0 };
     let all = execution.case("offset, exponent, drift and wave drawn");
     let mut rows =
-        vec![CaseRow::new(cell, &all, Quantity::mm("RMS, median"), ours.len(), ours_mm, pi_mm)];
+        vec![CaseRow::new(cell, &all, Quantity::mm("RMS, median"), ours.len(), ours_mm, required)];
     for wavelength_mm in WAVELENGTHS_MM {
         let lay = |control| -> Result<f64, ReproduceError> {
             let mut plan = Plan::new(cell, control)?.long(LENGTH_MM).laid(execution);
@@ -51,7 +53,7 @@ fn rows_laid(
             Ok(quantile(&plan.each(seeds, errors)?, 0.5))
         };
         let open = TARGET_MM * AMPLITUDE / std::f64::consts::SQRT_2;
-        let ratio = lay(Control::Distance)? / lay(Control::Pi)?.max(open);
+        let ratio = ratio(lay(Control::Distance)?, lay(Control::Pi)?.max(open));
         let case = execution.case(&format!("wave of {wavelength_mm} mm"));
         rows.push(CaseRow::new(
             cell,

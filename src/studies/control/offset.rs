@@ -47,18 +47,22 @@ fn rows_laid(
     let stopped = to_f64(all.iter().filter(|one| !one.complete).count());
     let wrong_side = to_f64(all.iter().filter(|one| one.names_wrong_side()).count());
     let after: Vec<f64> = shown.iter().map(|one| one.after_mm()).collect();
-    let row = |quantity, value, required| {
+    let row = |beads, quantity, value, required| {
         let case = execution.case("offset 20 % wrong");
-        CaseRow::new(cell, &case, quantity, shown.len(), value, required)
+        CaseRow::new(cell, &case, quantity, beads, value, required)
     };
-    let fraction = Quantity::ratio("fraction not noticed in time");
     let noticed = Quantity::mm("noticed after the first change, median");
-    let other_side = Quantity::ratio("fraction that names the wrong side");
+    let (of_shown, of_all) = (to_f64(shown.len()), to_f64(all.len()));
     Ok([
-        row(fraction, late / to_f64(shown.len()), 0.05),
-        row(other_side, wrong_side / to_f64(all.len()), 0.01),
-        row(noticed, quantile(&after, 0.5), f64::INFINITY),
-        row(Quantity::ratio("fraction stopped"), stopped / to_f64(all.len()), 0.01),
+        row(shown.len(), Quantity::ratio("fraction not noticed in time"), late / of_shown, 0.05),
+        row(
+            all.len(),
+            Quantity::ratio("fraction that names the wrong side"),
+            wrong_side / of_all,
+            0.01,
+        ),
+        row(shown.len(), noticed, quantile(&after, 0.5), f64::INFINITY),
+        row(all.len(), Quantity::ratio("fraction stopped"), stopped / of_all, 0.01),
     ])
 }
 

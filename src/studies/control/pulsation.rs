@@ -98,8 +98,14 @@ fn steady_rows(
     let (with, without) = (plan.each(seeds, of)?, off.each(seeds, of)?);
     let pairs = || with.iter().zip(&without);
     let ratios: Vec<f64> = pairs().map(|(with, without)| ratio(with.0, without.0)).collect();
-    let added: Vec<f64> =
-        pairs().map(|(with, without)| speed_change(&with.1, &without.1)).collect();
+    // A bead that was stopped has an infinite error, and no speed from there on.
+    let added: Vec<f64> = pairs()
+        .map(
+            |(with, without)| {
+                if with.0.is_finite() { speed_change(&with.1, &without.1) } else { with.0 }
+            },
+        )
+        .collect();
     let row = |quantity, value, required| {
         CaseRow::new(cell, &execution.case("no pulsation"), quantity, with.len(), value, required)
     };

@@ -6,8 +6,8 @@ use nalgebra::{Matrix2, Matrix4, Vector4};
 use super::exponent::Exponent;
 
 /// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
-/// does not move ln A less, but b and the errors of the offset, which would take a wave for an
-/// effect of the speed.
+/// does not move ln A less, but b. An error of the offset with a smaller effect is not learnt: a wave
+/// would be taken for it.
 const OTHER_SIGMA: f64 = 0.007;
 /// Smallest difference of ln v to the best known speed at which a width updates b: noise of
 /// reported speeds below it would bias b towards 0 (errors in variables).

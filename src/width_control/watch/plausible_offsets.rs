@@ -12,8 +12,9 @@ use crate::width_control::speed_history::SpeedHistory;
 /// Error of the offset up to which an answer may come sooner or later, as a fraction of it. Derived:
 /// a camera that is a quarter farther back than stated is stated a fifth too near.
 const LARGEST_ERROR: f64 = 0.25;
-/// The same where no place is excluded. Derived: two standard deviations where the cell states none.
-const LARGEST_ERROR_OF_ALL: f64 = 0.2;
+/// The same where no place is ever excluded, so that nothing shortens the wait. Derived: two standard
+/// deviations where the cell states none, one [`STEP`] less than [`LARGEST_ERROR`].
+const LARGEST_ERROR_WAITED_FOR: f64 = LARGEST_ERROR - STEP;
 /// Errors that are tried to either side of none. Derived: [`LARGEST_ERROR`] over [`STEP`].
 const STEPS: usize = 5;
 /// From one of them to the next. Derived: a fifth of the largest one, a third of a gauge of 12.7 mm that
@@ -105,7 +106,7 @@ impl PlausibleOffsets {
 
     /// Path within which a change of the speed is seen whole, wherever the camera looks \[mm\].
     pub fn span_mm(&self) -> f64 {
-        let largest = if self.excludes { LARGEST_ERROR } else { LARGEST_ERROR_OF_ALL };
+        let largest = if self.excludes { LARGEST_ERROR } else { LARGEST_ERROR_WAITED_FOR };
         2.0 * largest * self.offset_mm + self.gauge_mm
     }
 
@@ -165,6 +166,7 @@ impl PlausibleOffsets {
     /// are tried.
     pub fn plausible(&self) -> Range<usize> {
         if !self.excludes {
+            // Up to the largest error that is waited for.
             return 1..TRIED - 1;
         }
         if self.count == 0.0 {
