@@ -78,7 +78,7 @@ pub enum WidthUse {
     Taken,
     /// It is too far from its prediction; several that agree would make a flow change.
     Outlier,
-    /// With the widths before it, it shows that the flow has changed.
+    /// With the widths before it, it shows that the flow has changed, or that it has not, after all.
     Change,
     /// The speed at which that bead was laid is not known.
     NotMatched,
@@ -251,7 +251,7 @@ impl DistanceController {
         let (from_s, to_s) = (sample.laid_s - half, sample.laid_s + half);
         let pulsation = self.pulsation.mean(from_s, to_s);
         let variance = width_variance + self.pulsation.variance(from_s, to_s);
-        let observation = WidthObservation {
+        let mut observation = WidthObservation {
             ln_width: sample.ln_width - pulsation,
             ln_speed: sample.ln_speed,
             ln_speed_beside: sample.ln_speed_beside,
@@ -261,8 +261,9 @@ impl DistanceController {
         if !self.steps.is_under_way() && self.model.is_known() {
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
+        observation.variance *= self.noise.excess();
         let taken = self.update(sample, &observation);
-        // Without a width no pulsation is ever found.
+        // Outliers and widths within a step say nothing of a pulsation.
         let is_used = !matches!(taken, WidthUse::Change | WidthUse::Outlier);
         if is_used && self.settings.cancels_pulsation {
             let MatchedWidth { laid_s, lasted_s, ln_width, ln_speed, .. } = *sample;
@@ -285,24 +286,21 @@ impl DistanceController {
             self.model.update(observation, false);
             return WidthUse::Taken;
         }
-        let excess = self.noise.excess();
         let front = sample.position_mm + 0.5 * self.settings.gauge.get();
         self.steps.push(front, *observation, self.model);
         let was_under_way = self.steps.is_under_way();
-        if let Some(step) = self.steps.find(excess) {
+        if let Some(model) = self.steps.find() {
+            let predicted = |model: &WidthModel| observation.predicted(&model.estimate());
+            let change = predicted(&model) - predicted(&self.model);
+            self.pulsation.shift(change);
             if !was_under_way {
-                self.pulsation.loosen(step.size * step.size);
+                self.pulsation.loosen(change * change);
             }
-            self.replace_model(step.model, sample.position_mm, observation);
+            self.model = model;
+            self.outliers = OutlierRun::default();
             return WidthUse::Change;
         }
-        if was_under_way && let Some(before) = self.steps.without_step() {
-            self.replace_model(before, sample.position_mm, observation);
-            return WidthUse::Taken;
-        }
-        let observation =
-            WidthObservation { variance: observation.variance * excess, ..*observation };
-        let innovation = self.model.innovation(&observation);
+        let innovation = self.model.innovation(observation);
         if innovation.is_outlier() {
             if !self.outliers.agree(innovation, front, self.settings.gauge.get()) {
                 return WidthUse::Outlier;
@@ -311,24 +309,9 @@ impl DistanceController {
             return WidthUse::Taken;
         }
         self.outliers = OutlierRun::default();
-        let informs = self.model.informs_exponent(&observation) && !self.pulsation.is_found();
-        self.model.update(&observation, informs);
+        let informs = self.model.informs_exponent(observation) && !self.pulsation.is_found();
+        self.model.update(observation, informs);
         WidthUse::Taken
-    }
-
-    /// Takes over a model with or without a step of the flow; the hypotheses of a pulsation follow.
-    fn replace_model(
-        &mut self,
-        mut model: WidthModel,
-        position_mm: f64,
-        observation: &WidthObservation,
-    ) {
-        model.advance_to(position_mm, 0.0);
-        let at_speed =
-            |model: &WidthModel| model.ln_width() - model.exponent() * observation.ln_speed;
-        let change = at_speed(&model) - at_speed(&self.model);
-        self.model = model;
-        self.pulsation.shift(change);
     }
 
     /// The bead that is laid between two times \[s\].

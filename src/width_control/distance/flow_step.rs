@@ -8,7 +8,7 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix4x5, Matrix5, Vector4, Vector5};
 
 use super::width_model::{WidthModel, WidthObservation};
 use crate::numeric::number::{to_count, to_f64};
@@ -36,15 +36,13 @@ const MIN_LOG_ODDS: f64 = 8.0;
 /// Smallest step that is found, as a fraction: a smaller one the level follows, and a weak
 /// pulsation is not taken for a series of steps.
 const MIN_SIZE: f64 = 0.03;
-/// Smallest size of a step that has been found, as a fraction. Derived: half of [`MIN_SIZE`].
-const MIN_SIZE_LATER: f64 = 0.015;
-/// Distance of a width from a step from which it is an outlier, in standard deviations. Derived:
-/// once in 16,000 widths by chance.
-const OUTLIER_SIGMAS: f64 = 4.0;
+/// Normalised square of what a fit leaves of a width, from which it is an outlier. Derived: four
+/// standard deviations, once in 16,000 widths by chance.
+const OUTLIER_SQUARED: f64 = 16.0;
 /// Largest fraction of the widths after a step that may be outliers. Derived: every third width.
 const MAX_OUTLIER_RATIO: f64 = 0.34;
 /// Misfit of an outlier, as a negative log likelihood. Derived: half the normalised innovation
-/// squared from which a width is one.
+/// squared from which a width is one in the model.
 const OUTLIER_MISFIT: f64 = 6.125;
 /// Largest distance between positions that are tried, in gauges.
 const MAX_SPACING_GAUGES: f64 = 0.1;
@@ -52,24 +50,10 @@ const MAX_SPACING_GAUGES: f64 = 0.1;
 const MAX_POSITIONS: usize = 10;
 /// Smallest prior of a position: widths of a robot that hardly moves.
 const MIN_PRIOR: f64 = 1e-6;
-/// Iterations of the fit without a step (Gauss-Newton): an error of the offset has the more effect
-/// the larger b is.
-const ITERATIONS: usize = 3;
 /// Shortest gauge \[mm\]: a width at a point, as of a plant without a camera, counts as one.
 const MIN_GAUGE_MM: f64 = 1.0;
 /// Length after a step, beyond the gauge, after which it is part of the model, in gauges.
 const SETTLED_GAUGES: f64 = 0.25;
-
-/// A width with the model before it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct WidthRecord {
-    /// End of the gauge that was laid last \[mm\].
-    front_mm: f64,
-    observation: WidthObservation,
-    before: WidthModel,
-    /// Whether it is too far from its prediction.
-    is_outlier: bool,
-}
 
 /// The last widths.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,24 +63,13 @@ pub struct StepDetector {
     is_under_way: bool,
 }
 
-/// A step, from the widths until now.
+/// A width with the model before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlowStep {
-    /// Change of ln A.
-    pub size: f64,
-    /// The model after it.
-    pub model: WidthModel,
-}
-
-/// A step at one position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Candidate {
-    position_mm: f64,
-    log_odds: f64,
-    size: f64,
-    /// The model's state after it.
-    state: Vector4<f64>,
-    covariance: Matrix4<f64>,
+struct WidthRecord {
+    /// End of the gauge that was laid last \[mm\].
+    front_mm: f64,
+    observation: WidthObservation,
+    before: WidthModel,
 }
 
 impl StepDetector {
@@ -114,60 +87,12 @@ impl StepDetector {
 
     /// Adds a width of bead up to a position \[mm\], with the model before it.
     pub fn push(&mut self, front_mm: f64, observation: WidthObservation, before: WidthModel) {
-        let is_outlier = before.innovation(&observation).is_outlier();
         let kept = KEPT_GAUGES * self.gauge_mm + KEPT_MM;
         let is_old = |record: &WidthRecord| record.front_mm < front_mm - kept;
         while self.records.len() >= MAX_WIDTHS || self.records.front().is_some_and(is_old) {
             self.records.pop_front();
         }
-        self.records.push_back(WidthRecord { front_mm, observation, before, is_outlier });
-    }
-
-    /// The step that the widths show, if they do. `scale` is how much larger innovations have
-    /// been than predicted, as a variance.
-    pub fn find(&mut self, scale: f64) -> Option<FlowStep> {
-        let found = Self::mean_of(&self.candidates(scale)).filter(|found| {
-            let least = if self.is_under_way { MIN_SIZE_LATER } else { MIN_SIZE };
-            found.log_odds > MIN_LOG_ODDS && found.size.abs() > least
-        });
-        let Some(found) = found else {
-            self.is_under_way = false;
-            return None;
-        };
-        let newest = self.records.back()?;
-        let model = newest.before.with_estimate(found.state, found.covariance);
-        let is_settled =
-            newest.front_mm > found.position_mm + self.gauge_mm * (1.0 + SETTLED_GAUGES);
-        self.is_under_way = true;
-        if is_settled {
-            self.clear();
-        }
-        Some(FlowStep { size: found.size, model })
-    }
-
-    /// The mean of all candidates, weighted by their evidence; `None` without any.
-    fn mean_of(candidates: &[Candidate]) -> Option<Candidate> {
-        let largest = candidates.iter().map(|one| one.log_odds).reduce(f64::max)?;
-        let weight = |one: &Candidate| libm::exp(one.log_odds - largest);
-        let total: f64 = candidates.iter().map(weight).sum();
-        let mut mean = Candidate {
-            position_mm: 0.0,
-            log_odds: largest + libm::log(total),
-            size: 0.0,
-            state: Vector4::zeros(),
-            covariance: Matrix4::zeros(),
-        };
-        for one in candidates {
-            let part = weight(one) / total;
-            mean.position_mm += part * one.position_mm;
-            mean.size += part * one.size;
-            mean.state += part * one.state;
-        }
-        for one in candidates {
-            let off = one.state - mean.state;
-            mean.covariance += (weight(one) / total) * (one.covariance + off * off.transpose());
-        }
-        Some(mean)
+        self.records.push_back(WidthRecord { front_mm, observation, before });
     }
 
     /// Whether a step was found that widths still may change.
@@ -175,115 +100,107 @@ impl StepDetector {
         self.is_under_way
     }
 
-    /// The model as if there had been no step, from all widths that are kept.
-    pub fn without_step(&self) -> Option<WidthModel> {
-        let mut model = self.records.front()?.before;
-        for record in &self.records {
-            if !model.innovation(&record.observation).is_outlier() {
-                model.update(&record.observation, false);
-            }
+    /// The model after the step that the widths show, if they do; once they no longer show the one that
+    /// was under way, the model without it.
+    pub fn find(&mut self) -> Option<WidthModel> {
+        let base = self.records.front()?.before;
+        let widths = self.seen_widths(&base.estimate());
+        let newest = widths.iter().rev().take(NEWEST_WIDTHS);
+        if !self.is_under_way && newest.filter(|one| one.has_changed()).count() < MIN_WIDTHS {
+            return None;
+        }
+        let mut equations = NormalEquations::new(&base)?;
+        widths.iter().for_each(|one| equations.add(one, 1.0));
+        let without_step = equations.fit(widths.clone())?;
+        let found = self.likely_step(equations, &widths, without_step.ln_evidence);
+        let Some(step) = found else {
+            let was_under_way = std::mem::take(&mut self.is_under_way);
+            return self
+                .model_after(&without_step, Matrix4x5::identity())
+                .filter(|_| was_under_way);
+        };
+        self.is_under_way = true;
+        // The size of the step is a change of ln A.
+        let mut to_state = Matrix4x5::identity();
+        to_state.m15 = 1.0;
+        let model = self.model_after(&step.fit, to_state)?;
+        let settled_mm = step.position_mm + self.gauge_mm * (1.0 + SETTLED_GAUGES);
+        if self.records.back()?.front_mm > settled_mm {
+            self.clear();
         }
         Some(model)
     }
 
-    fn candidates(&self, scale: f64) -> Vec<Candidate> {
-        let Some(base) = self.records.front().map(|record| record.before) else {
-            return Vec::new();
-        };
-        let residuals = self.residuals(&base, scale, &base.estimate());
-        let newest = residuals.iter().rev().take(NEWEST_WIDTHS);
-        if !self.is_under_way && newest.filter(|one| one.is_changed()).count() < MIN_WIDTHS {
-            return Vec::new();
+    /// The newest model, with the state that a fit leads to.
+    fn model_after(&self, fit: &Fit, to_state: Matrix4x5<f64>) -> Option<WidthModel> {
+        let (base, newest) = (self.records.front()?.before, self.records.back()?.before);
+        let state = base.estimate() + to_state * fit.change;
+        Some(newest.with_estimate(state, to_state * fit.covariance * to_state.transpose()))
+    }
+
+    /// The mean of the steps at all positions, if together they are likely enough, and large enough.
+    fn likely_step(
+        &self,
+        equations: NormalEquations,
+        widths: &[SeenWidth],
+        without_step: f64,
+    ) -> Option<Candidate> {
+        let candidates: Vec<Candidate> =
+            self.positions().filter_map(|at| self.with_step(equations, widths, at)).collect();
+        let evidence = candidates.iter().map(|one| one.fit.ln_evidence);
+        let largest = evidence.clone().reduce(f64::max)?;
+        let total: f64 = evidence.map(|one| libm::exp(one - largest)).sum();
+        if largest + libm::log(total) - without_step < MIN_LOG_ODDS {
+            return None;
         }
-        let mut changed =
-            (0..residuals.len()).rev().filter(|number| residuals[*number].is_changed());
-        // After a later step too few widths would have changed.
-        let Some(last) = changed.nth(MIN_WIDTHS - 1) else { return Vec::new() };
-        let Some(mut before) = NormalEquations::new(&base) else { return Vec::new() };
-        let Some(without_step) = self.misfit_without_step(&base, scale) else { return Vec::new() };
-        let mut found = Vec::new();
-        for number in 1..=last {
-            let (widths_before, after) = residuals.split_at(number);
-            before.add_unless_outlier(&widths_before[number - 1]);
-            for position in self.positions(widths_before[number - 1].front_mm, after[0].front_mm) {
-                let after = after.iter().map(|one| self.changed(one, position.at_mm));
-                found.extend(before.with_step(after.collect()).map(|step| Candidate {
-                    position_mm: position.at_mm,
-                    log_odds: without_step - step.misfit + position.log_prior,
-                    size: step.size,
-                    state: base.estimate() + step.change,
-                    covariance: step.covariance,
-                }));
-            }
+        let step = Candidate::mean_of(&candidates, largest, total);
+        (self.is_under_way || step.fit.change[STEP].abs() > MIN_SIZE).then_some(step)
+    }
+
+    /// All widths, without a step, less what a state predicts.
+    fn seen_widths(&self, state: &Vector4<f64>) -> Vec<SeenWidth> {
+        let seen = |WidthRecord { observation, .. }: &WidthRecord| SeenWidth {
+            by: observation.ln_width - observation.predicted(state),
+            slopes: observation.slopes(state).push(0.0),
+            variance: observation.variance,
+        };
+        self.records.iter().map(seen).collect()
+    }
+
+    /// Positions to try between the ends of the gauges of successive widths; a step is as likely
+    /// anywhere.
+    fn positions(&self) -> impl Iterator<Item = Position> {
+        let between = |last_mm: f64, next_mm: f64| {
+            let apart = (next_mm - last_mm) / (MAX_SPACING_GAUGES * self.gauge_mm);
+            let pieces = to_count(apart.ceil()).clamp(1, MAX_POSITIONS);
+            let length = (next_mm - last_mm) / to_f64(pieces);
+            let log_prior = libm::log((length / self.gauge_mm).max(MIN_PRIOR));
+            let middle = move |piece| last_mm + (to_f64(piece) + 0.5) * length;
+            (0..pieces).map(move |piece| Position { at_mm: middle(piece), log_prior })
+        };
+        let fronts = self.records.iter().map(|record| record.front_mm);
+        fronts.clone().zip(fronts.skip(1)).flat_map(move |(last, next)| between(last, next))
+    }
+
+    fn with_step(
+        &self,
+        mut equations: NormalEquations,
+        widths: &[SeenWidth],
+        position: Position,
+    ) -> Option<Candidate> {
+        let after_step = |front_mm: f64| (front_mm - position.at_mm) / self.gauge_mm;
+        let mut widths = widths.to_vec();
+        for (one, record) in widths.iter_mut().zip(&self.records) {
+            one.slopes[STEP] = after_step(record.front_mm).clamp(0.0, 1.0);
+            equations.add_step(one);
         }
-        found
+        let after = widths.iter().filter(|one| one.shows_step()).count();
+        let fit = equations.fit(widths)?;
+        let most = to_count(MAX_OUTLIER_RATIO * to_f64(after));
+        let ln_evidence = fit.ln_evidence + position.log_prior;
+        let candidate = Candidate { position_mm: position.at_mm, fit: Fit { ln_evidence, ..fit } };
+        (fit.after >= MIN_WIDTHS.max(after - most)).then_some(candidate)
     }
-
-    /// Positions to try between the ends of two gauges \[mm\]; a step is as likely anywhere.
-    fn positions(&self, last_mm: f64, next_mm: f64) -> impl Iterator<Item = Position> {
-        let apart = (next_mm - last_mm) / (MAX_SPACING_GAUGES * self.gauge_mm);
-        let pieces = to_count(apart.ceil()).clamp(1, MAX_POSITIONS);
-        let length = (next_mm - last_mm) / to_f64(pieces);
-        let log_prior = libm::log((length / self.gauge_mm).max(MIN_PRIOR));
-        let middle = move |piece| last_mm + (to_f64(piece) + 0.5) * length;
-        (0..pieces).map(move |piece| Position { at_mm: middle(piece), log_prior })
-    }
-
-    fn changed(&self, residual: &Residual, position_mm: f64) -> Changed {
-        let after = (residual.front_mm - position_mm) / self.gauge_mm;
-        Changed { fraction: after.clamp(0.0, 1.0), residual: *residual }
-    }
-
-    /// The widths less their prediction by the model before all of them, linear about a state.
-    fn residuals(&self, base: &WidthModel, scale: f64, about: &Vector4<f64>) -> Vec<Residual> {
-        let change = about - base.estimate();
-        let residual = |record: &WidthRecord| {
-            let observation = &record.observation;
-            let slopes = observation.slopes(about);
-            Residual {
-                front_mm: record.front_mm,
-                by: observation.ln_width - observation.predicted(about) + slopes.dot(&change),
-                slopes,
-                variance: observation.variance * scale,
-                is_outlier: record.is_outlier,
-            }
-        };
-        self.records.iter().map(residual).collect()
-    }
-
-    /// Misfit of all widths without a step: either all of them are as they should be, or those far
-    /// from the model before are outliers.
-    fn misfit_without_step(&self, base: &WidthModel, scale: f64) -> Option<f64> {
-        let equations = NormalEquations::new(base)?;
-        let far = |one: &Residual| one.misfit() > OUTLIER_MISFIT;
-        let outliers: Vec<bool> =
-            self.residuals(base, scale, &base.estimate()).iter().map(far).collect();
-        let least = |leaves_out: bool| {
-            let mut about = base.estimate();
-            let mut misfit = None;
-            for _ in 0..ITERATIONS {
-                let mut all = equations;
-                for (one, left) in self.residuals(base, scale, &about).iter().zip(&outliers) {
-                    all.add_unless_outlier(&Residual { is_outlier: leaves_out && *left, ..*one });
-                }
-                let found = all.solve()?;
-                about = base.estimate() + found.change;
-                misfit = Some(found.misfit);
-            }
-            misfit
-        };
-        Some(least(false)?.min(least(true)?))
-    }
-}
-
-/// A width less its prediction by the model before all of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Residual {
-    front_mm: f64,
-    by: f64,
-    slopes: Vector4<f64>,
-    variance: f64,
-    is_outlier: bool,
 }
 
 /// A position at which the flow may have stepped.
@@ -293,155 +210,124 @@ struct Position {
     log_prior: f64,
 }
 
-/// A width of which a fraction of the gauge lies after a step.
+/// A step at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Changed {
-    fraction: f64,
-    residual: Residual,
+struct Candidate {
+    position_mm: f64,
+    fit: Fit,
 }
 
-/// Normal equations of the errors of ln A, of b and of the offset.
+impl Candidate {
+    /// The mean of candidates, weighted by their evidence. `total` is the sum of it over that of the
+    /// likeliest.
+    fn mean_of(candidates: &[Self], likeliest: f64, total: f64) -> Self {
+        let weight = |one: &Self| libm::exp(one.fit.ln_evidence - likeliest) / total;
+        let position_mm = candidates.iter().map(|one| weight(one) * one.position_mm).sum();
+        let change: Vector5<f64> = candidates.iter().map(|one| weight(one) * one.fit.change).sum();
+        let spread = |one: &Self| {
+            let off = one.fit.change - change;
+            weight(one) * (one.fit.covariance + off * off.transpose())
+        };
+        let covariance = candidates.iter().map(spread).sum();
+        let after = candidates.iter().map(|one| one.fit.after).max().unwrap_or(0);
+        let ln_evidence = likeliest + libm::log(total);
+        Self { position_mm, fit: Fit { ln_evidence, change, covariance, after } }
+    }
+}
+
+/// A width less its prediction by the model before all of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct SeenWidth {
+    by: f64,
+    /// By how much it changes with the errors of ln A, of b and of the offset, and with the size of the
+    /// step.
+    slopes: Vector5<f64>,
+    variance: f64,
+}
+
+impl SeenWidth {
+    fn has_changed(&self) -> bool {
+        self.by * self.by > MIN_CHANGE_SIGMAS * MIN_CHANGE_SIGMAS * self.variance
+    }
+
+    fn shows_step(&self) -> bool {
+        self.slopes[STEP] > 0.0
+    }
+
+    /// Normalised square of what is left of it.
+    fn squared(&self, change: &Vector5<f64>) -> f64 {
+        (self.by - self.slopes.dot(change)).powi(2) / self.variance
+    }
+}
+
+/// Component of a [`Fit`] that is the size of the step.
+const STEP: usize = 4;
+
+/// Errors of ln A, of b and of the offset, and the size of the step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Fit {
+    /// Logarithm of its evidence, without a constant.
+    ln_evidence: f64,
+    change: Vector5<f64>,
+    covariance: Matrix5<f64>,
+    /// Number of widths that show some of the step and are no outliers.
+    after: usize,
+}
+
+/// Normal equations of a [`Fit`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct NormalEquations {
-    information: Matrix4<f64>,
-    weighted: Vector4<f64>,
-    /// Misfit of the model before all widths, of those that are in the equations and of the
-    /// outliers.
-    misfit: f64,
-}
-
-/// Errors of the model before all widths, without a step.
-struct Errors {
-    change: Vector4<f64>,
-    /// What they leave, as a negative log likelihood.
-    misfit: f64,
-}
-
-/// What a step explains.
-struct StepSolution {
-    /// What it leaves, as a negative log likelihood.
-    misfit: f64,
-    size: f64,
-    /// Change of the state from before all widths to after the step.
-    change: Vector4<f64>,
-    covariance: Matrix4<f64>,
-}
-
-/// The size of a step, with the errors of the model before it.
-struct StepFit {
-    size: f64,
-    /// One over the variance of the size.
-    precision: f64,
-    /// The errors with the step.
-    change: Vector4<f64>,
-    /// Their covariance without a step.
-    covariance: Matrix4<f64>,
-    /// How much they change with the size.
-    by_size: Vector4<f64>,
+    information: Matrix5<f64>,
+    weighted: Vector5<f64>,
+    /// What is left of the widths without any change, as a negative log likelihood, and the price of
+    /// those that are left out.
     misfit: f64,
 }
 
 impl NormalEquations {
+    /// Before the first width, from the model before it.
     fn new(base: &WidthModel) -> Option<Self> {
-        let information = base.covariance().try_inverse()?;
-        Some(Self { information, weighted: Vector4::zeros(), misfit: 0.0 })
+        let of_model = base.covariance().try_inverse()?;
+        let mut information = Matrix5::from_diagonal_element(1.0 / (SIZE_SIGMA * SIZE_SIGMA));
+        information.fixed_view_mut::<4, 4>(0, 0).copy_from(&of_model);
+        Some(Self { information, weighted: Vector5::zeros(), misfit: 0.0 })
     }
 
-    fn add(&mut self, one: &Residual) {
-        self.information += one.slopes * one.slopes.transpose() / one.variance;
-        self.weighted += one.slopes * (one.by / one.variance);
-        self.misfit += one.misfit();
+    /// Adds a width `times` times; −1 takes it out again.
+    fn add(&mut self, one: &SeenWidth, times: f64) {
+        let weight = times / one.variance;
+        self.information += one.slopes * one.slopes.transpose() * weight;
+        self.weighted += one.slopes * (one.by * weight);
+        self.misfit += 0.5 * one.by * one.by * weight;
     }
 
-    fn add_unless_outlier(&mut self, one: &Residual) {
-        if one.is_outlier {
-            self.misfit += OUTLIER_MISFIT;
-        } else {
-            self.add(one);
+    /// Adds what a width says of the step. The width itself has been added before, without the step. The
+    /// Cholesky decomposition reads only the lower triangle.
+    fn add_step(&mut self, one: &SeenWidth) {
+        let weight = one.slopes[STEP] / one.variance;
+        for other in 0..=STEP {
+            self.information[(STEP, other)] += weight * one.slopes[other];
         }
+        self.weighted[STEP] += weight * one.by;
     }
 
-    /// The errors that explain the widths, and what they leave.
-    fn solve(&self) -> Option<Errors> {
-        let change = self.information.try_inverse()? * self.weighted;
-        Some(Errors { change, misfit: self.misfit - 0.5 * self.weighted.dot(&change) })
-    }
-
-    /// The step that explains the widths after it.
-    fn with_step(&self, mut after: Vec<Changed>) -> Option<StepSolution> {
-        let (fit, left_out) = self.fit_most(&mut after)?;
-        let follows = |one: &&Changed| {
-            one.residual.is_changed() && one.residual.by.signum() == fit.size.signum()
-        };
-        if after.iter().filter(follows).count() < MIN_WIDTHS {
-            return None;
-        }
-        let slopes = Vector4::x() - fit.by_size;
-        Some(StepSolution {
-            misfit: fit.misfit + OUTLIER_MISFIT * to_f64(left_out),
-            size: fit.size,
-            change: fit.change + Vector4::x() * fit.size,
-            covariance: fit.covariance + slopes * slopes.transpose() / fit.precision,
-        })
-    }
-
-    /// A fit that leaves out the width that is farthest from it as an outlier, as long as there is
-    /// one; and how many these were.
-    fn fit_most(&self, after: &mut Vec<Changed>) -> Option<(StepFit, usize)> {
-        let most = to_count(MAX_OUTLIER_RATIO * to_f64(after.len()));
-        let mut left_out = 0;
+    /// The fit to the widths that have been added. The one that is farthest from it is left out as an
+    /// outlier, as long as there is one.
+    fn fit(mut self, mut widths: Vec<SeenWidth>) -> Option<Fit> {
         loop {
-            let fit = self.fit(after)?;
-            let squares = after.iter().map(|one| fit.squared(one)).enumerate();
+            let cholesky = self.information.cholesky()?;
+            let change = cholesky.solve(&self.weighted);
+            let squares = widths.iter().map(|one| one.squared(&change)).enumerate();
             let (worst, squared) = squares.max_by(|a, b| a.1.total_cmp(&b.1))?;
-            if squared <= OUTLIER_SIGMAS * OUTLIER_SIGMAS {
-                return Some((fit, left_out));
+            if squared <= OUTLIER_SQUARED {
+                let explained = 0.5 * self.weighted.dot(&change);
+                let ln_evidence = explained - self.misfit - 0.5 * cholesky.ln_determinant();
+                let after = widths.iter().filter(|one| one.shows_step()).count();
+                return Some(Fit { ln_evidence, change, covariance: cholesky.inverse(), after });
             }
-            if left_out == most {
-                return None;
-            }
-            left_out += 1;
-            after.swap_remove(worst);
+            self.add(&widths.swap_remove(worst), -1.0);
+            self.misfit += OUTLIER_MISFIT;
         }
-    }
-
-    fn fit(&self, after: &[Changed]) -> Option<StepFit> {
-        let prior = 1.0 / (SIZE_SIGMA * SIZE_SIGMA);
-        let mut all = *self;
-        let (mut both, mut squares, mut by) = (Vector4::zeros(), prior, 0.0);
-        for Changed { fraction, residual } in after {
-            all.add(residual);
-            let weight = fraction / residual.variance;
-            both += residual.slopes * weight;
-            squares += weight * fraction;
-            by += weight * residual.by;
-        }
-        let covariance = all.information.try_inverse()?;
-        let (without, by_size) = (covariance * all.weighted, covariance * both);
-        let precision = squares - both.dot(&by_size);
-        let size = (by - both.dot(&without)) / precision;
-        let explained = all.weighted.dot(&without) + size * size * precision;
-        let misfit = all.misfit - 0.5 * explained + 0.5 * libm::log(precision / prior);
-        let change = without - by_size * size;
-        Some(StepFit { size, precision, change, covariance, by_size, misfit })
-    }
-}
-
-impl StepFit {
-    /// Normalised square of what the fit leaves of a width.
-    fn squared(&self, one: &Changed) -> f64 {
-        let Residual { by, slopes, variance, .. } = one.residual;
-        (by - slopes.dot(&self.change) - one.fraction * self.size).powi(2) / variance
-    }
-}
-
-impl Residual {
-    fn is_changed(&self) -> bool {
-        self.by * self.by > MIN_CHANGE_SIGMAS * MIN_CHANGE_SIGMAS * self.variance
-    }
-
-    fn misfit(&self) -> f64 {
-        0.5 * self.by * self.by / self.variance
     }
 }
 
@@ -466,42 +352,64 @@ mod tests {
         WidthObservation { ln_width, ln_speed: -0.3, ln_speed_beside: [0.0; 2], variance: 3e-5 }
     }
 
-    /// Widths every 1.5 mm over a flow that steps at 100 mm, until the gauge's end has come as far
-    /// as `until`; one of them may be an outlier.
-    fn found(size: f64, until: f64, outlier: Option<usize>) -> Option<FlowStep> {
+    /// Change of the predicted ln w, at the speed of the widths.
+    fn change(before: &WidthModel, after: &WidthModel) -> f64 {
+        let predicted = |model: &WidthModel| width(0.0).predicted(&model.estimate());
+        predicted(after) - predicted(before)
+    }
+
+    /// The last of the widths every 1.5 mm over a flow that steps at 100 mm, until the gauge's end has
+    /// come as far as `until`: the size that is found, and whether the step is under way. Widths of
+    /// these numbers are outliers.
+    #[derive(Debug)]
+    struct Last {
+        size: Option<f64>,
+        is_under_way: bool,
+    }
+
+    fn last(size: f64, until: f64, is_outlier: impl Fn(u32) -> bool) -> Last {
         let model = known();
         let ln_width = width(0.0).predicted(&model.estimate());
         let mut detector = StepDetector::new(GAUGE);
         let mut last = None;
-        let mut front = 60.0;
-        let mut number = 0;
-        while front < until {
+        let fronts = (0_u32..).map(|number| (number, 60.0 + 1.5 * f64::from(number)));
+        for (number, front) in fronts.take_while(|(_, front)| *front < until) {
             let fraction = ((front - 100.0) / GAUGE).clamp(0.0, 1.0);
-            let more = if outlier == Some(number) { 0.2 } else { 0.0 };
+            let more = if is_outlier(number) { 0.2 } else { 0.0 };
             detector.push(front, width(ln_width + fraction * size + more), model);
-            last = detector.find(1.0);
-            front += 1.5;
-            number += 1;
+            last = detector.find().map(|found| change(&model, &found));
         }
-        last
+        Last { size: last, is_under_way: detector.is_under_way() }
+    }
+
+    fn found(size: f64, until: f64) -> f64 {
+        last(size, until, |_| false).size.unwrap()
     }
 
     #[test]
     fn a_quarter_of_a_gauge_is_enough_for_a_step_and_its_size() {
         for size in [0.08, -0.08, 0.15] {
-            let step = found(size, 100.0 + 0.25 * GAUGE, None).unwrap();
-            assert!((step.size / size - 1.0).abs() < 0.2, "{size}: {step:?}");
-            let half = found(size, 100.0 + 0.6 * GAUGE, None).unwrap();
-            assert!((half.size / size - 1.0).abs() < 0.05, "{size}: {half:?}");
+            let step = found(size, 100.0 + 0.25 * GAUGE);
+            assert!((step / size - 1.0).abs() < 0.2, "{size}: {step}");
+            let half = found(size, 100.0 + 0.6 * GAUGE);
+            assert!((half / size - 1.0).abs() < 0.05, "{size}: {half}");
         }
     }
 
     #[test]
     fn without_a_step_and_with_an_outlier_none_is_found() {
-        assert_eq!(found(0.0, 180.0, None), None);
+        assert_eq!(last(0.0, 180.0, |_| false).size, None);
         for outlier in [20, 40, 60] {
-            assert_eq!(found(0.0, 180.0, Some(outlier)), None, "{outlier}");
+            assert_eq!(last(0.0, 180.0, |number| number == outlier).size, None, "{outlier}");
         }
+    }
+
+    #[test]
+    fn every_fourth_width_may_be_an_outlier_before_a_step_and_after_it() {
+        let of_flow = last(0.08, 100.0 + 0.6 * GAUGE, |number| number % 4 == 1);
+        assert!((of_flow.size.unwrap() - 0.08).abs() < 0.01, "{of_flow:?}");
+        let none = last(0.0, 100.0 + 0.6 * GAUGE, |number| number % 4 == 1);
+        assert_eq!(none.size, None);
     }
 
     #[test]
@@ -514,15 +422,17 @@ mod tests {
             // Two widths at every place.
             let front = 2.0 * f64::from(number / 2);
             detector.push(front, width(width(0.0).predicted(&model.estimate()) + step), model);
-            last = detector.find(1.0).or(last);
+            last = detector.find().or(last);
         }
-        assert!((last.unwrap().size - 0.08).abs() < 0.01, "{last:?}");
+        let step = change(&model, &last.unwrap());
+        assert!((step - 0.08).abs() < 0.01, "{step}");
     }
 
     #[test]
     fn a_step_that_lies_behind_the_gauge_is_no_longer_under_way() {
-        let step = found(0.08, 100.0 + 1.2 * GAUGE, None).unwrap();
-        assert!((step.size - 0.08).abs() < 0.004, "{step:?}");
-        assert!(step.model.sigma() < 0.005, "{step:?}");
+        let entering = last(0.08, 100.0 + 1.2 * GAUGE, |_| false);
+        assert!(entering.is_under_way, "{entering:?}");
+        assert!((entering.size.unwrap() - 0.08).abs() < 0.004, "{entering:?}");
+        assert!(!last(0.08, 100.0 + 1.28 * GAUGE, |_| false).is_under_way);
     }
 }
