@@ -318,13 +318,13 @@ impl NormalEquations {
             let cholesky = self.information.cholesky()?;
             let change = cholesky.solve(&self.weighted);
             let squares = widths.iter().map(|one| one.squared(&change)).enumerate();
-            let (worst, squared) = squares.max_by(|a, b| a.1.total_cmp(&b.1))?;
-            if squared <= OUTLIER_SQUARED {
+            let farthest = squares.max_by(|a, b| a.1.total_cmp(&b.1));
+            let Some((worst, _)) = farthest.filter(|one| one.1 > OUTLIER_SQUARED) else {
                 let explained = 0.5 * self.weighted.dot(&change);
                 let ln_evidence = explained - self.misfit - 0.5 * cholesky.ln_determinant();
                 let after = widths.iter().filter(|one| one.shows_step()).count();
                 return Some(Fit { ln_evidence, change, covariance: cholesky.inverse(), after });
-            }
+            };
             self.add(&widths.swap_remove(worst), -1.0);
             self.misfit += OUTLIER_MISFIT;
         }
