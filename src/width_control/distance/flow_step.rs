@@ -110,7 +110,9 @@ impl StepDetector {
             return None;
         }
         let mut equations = NormalEquations::new(&base)?;
-        widths.iter().for_each(|one| equations.add(one, 1.0));
+        for one in &widths {
+            equations.add(one, 1.0);
+        }
         let without_step = equations.fit(widths.clone())?;
         let found = self.likely_step(equations, &widths, without_step.ln_evidence);
         let Some(step) = found else {
