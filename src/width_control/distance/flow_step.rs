@@ -114,18 +114,19 @@ impl StepDetector {
             equations.add(one, 1.0);
         }
         let without_step = equations.fit(widths.clone())?;
-        let found = self.likely_step(equations, &widths, without_step.ln_evidence);
+        let found = self.likely_step(equations, &widths, &without_step);
         let Some(step) = found else {
             let was_under_way = std::mem::take(&mut self.is_under_way);
+            let Fit { change, covariance, .. } = without_step;
             return self
-                .model_after(&without_step, Matrix4x5::identity())
+                .model_after(&change, &covariance, Matrix4x5::identity())
                 .filter(|_| was_under_way);
         };
         self.is_under_way = true;
         // The size of the step is a change of ln A.
         let mut to_state = Matrix4x5::identity();
         to_state.m15 = 1.0;
-        let model = self.model_after(&step.fit, to_state)?;
+        let model = self.model_after(&step.change, &step.covariance, to_state)?;
         let settled_mm = step.position_mm + self.gauge_mm * (1.0 + SETTLED_GAUGES);
         if self.records.back()?.front_mm > settled_mm {
             self.clear();
@@ -133,11 +134,16 @@ impl StepDetector {
         Some(model)
     }
 
-    /// The newest model, with the state that a fit leads to.
-    fn model_after(&self, fit: &Fit, to_state: Matrix4x5<f64>) -> Option<WidthModel> {
+    /// The newest model, with the state to which a change leads, and its covariance.
+    fn model_after(
+        &self,
+        change: &Vector5<f64>,
+        covariance: &Matrix5<f64>,
+        to_state: Matrix4x5<f64>,
+    ) -> Option<WidthModel> {
         let (base, newest) = (self.records.front()?.before, self.records.back()?.before);
-        let state = base.estimate() + to_state * fit.change;
-        Some(newest.with_estimate(state, to_state * fit.covariance * to_state.transpose()))
+        let state = base.estimate() + to_state * change;
+        Some(newest.with_estimate(state, to_state * covariance * to_state.transpose()))
     }
 
     /// The mean of the steps at all positions, if together they are likely enough, and large enough.
@@ -145,18 +151,20 @@ impl StepDetector {
         &self,
         equations: NormalEquations,
         widths: &[SeenWidth],
-        without_step: f64,
-    ) -> Option<Candidate> {
-        let candidates: Vec<Candidate> =
-            self.positions().filter_map(|at| self.with_step(equations, widths, at)).collect();
+        without_step: &Fit,
+    ) -> Option<LikelyStep> {
+        let candidates: Vec<Candidate> = self
+            .positions(without_step)
+            .filter_map(|at| self.with_step(equations, widths, at))
+            .collect();
         let evidence = candidates.iter().map(|one| one.fit.ln_evidence);
         let largest = evidence.clone().reduce(f64::max)?;
         let total: f64 = evidence.map(|one| libm::exp(one - largest)).sum();
-        if largest + libm::log(total) - without_step < MIN_LOG_ODDS {
+        if largest + libm::log(total) - without_step.ln_evidence < MIN_LOG_ODDS {
             return None;
         }
-        let step = Candidate::mean_of(&candidates, largest, total);
-        (self.is_under_way || step.fit.change[STEP].abs() > MIN_SIZE).then_some(step)
+        let step = LikelyStep::mean_of(&candidates, largest, total);
+        (self.is_under_way || step.change[STEP].abs() > MIN_SIZE).then_some(step)
     }
 
     /// All widths, without a step, less what a state predicts.
@@ -169,9 +177,14 @@ impl StepDetector {
         self.records.iter().map(seen).collect()
     }
 
-    /// Positions to try between the ends of the gauges of successive widths; a step is as likely
-    /// anywhere.
-    fn positions(&self) -> impl Iterator<Item = Position> {
+    /// Positions to try between the ends of the gauges of successive widths, where a step is as likely
+    /// anywhere. Where most widths do not fit without a step, one before all of them too: the change came
+    /// faster than a gauge sees a step, and the model has not followed it.
+    fn positions(&self, without_step: &Fit) -> impl Iterator<Item = Position> {
+        let is_missed = 2 * without_step.outliers > self.records.len();
+        let first = self.records.front().filter(|_| is_missed);
+        let first = first.map(|record| record.front_mm - self.gauge_mm);
+        let before_all = first.map(|at_mm| Position { at_mm, log_prior: 0.0 });
         let between = |last_mm: f64, next_mm: f64| {
             let apart = (next_mm - last_mm) / (MAX_SPACING_GAUGES * self.gauge_mm);
             let pieces = to_count(apart.ceil()).clamp(1, MAX_POSITIONS);
@@ -181,7 +194,8 @@ impl StepDetector {
             (0..pieces).map(move |piece| Position { at_mm: middle(piece), log_prior })
         };
         let fronts = self.records.iter().map(|record| record.front_mm);
-        fronts.clone().zip(fronts.skip(1)).flat_map(move |(last, next)| between(last, next))
+        let within = fronts.clone().zip(fronts.skip(1));
+        before_all.into_iter().chain(within.flat_map(move |(last, next)| between(last, next)))
     }
 
     fn with_step(
@@ -219,21 +233,26 @@ struct Candidate {
     fit: Fit,
 }
 
-impl Candidate {
-    /// The mean of candidates, weighted by their evidence. `total` is the sum of it over that of the
-    /// likeliest.
-    fn mean_of(candidates: &[Self], likeliest: f64, total: f64) -> Self {
-        let weight = |one: &Self| libm::exp(one.fit.ln_evidence - likeliest) / total;
+/// The mean of the steps at all positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LikelyStep {
+    position_mm: f64,
+    change: Vector5<f64>,
+    covariance: Matrix5<f64>,
+}
+
+impl LikelyStep {
+    /// Of candidates, weighted by their evidence. `total` is the sum of it over that of the likeliest.
+    fn mean_of(candidates: &[Candidate], likeliest: f64, total: f64) -> Self {
+        let weight = |one: &Candidate| libm::exp(one.fit.ln_evidence - likeliest) / total;
         let position_mm = candidates.iter().map(|one| weight(one) * one.position_mm).sum();
         let change: Vector5<f64> = candidates.iter().map(|one| weight(one) * one.fit.change).sum();
-        let spread = |one: &Self| {
+        let spread = |one: &Candidate| {
             let off = one.fit.change - change;
             weight(one) * (one.fit.covariance + off * off.transpose())
         };
         let covariance = candidates.iter().map(spread).sum();
-        let after = candidates.iter().map(|one| one.fit.after).max().unwrap_or(0);
-        let ln_evidence = likeliest + libm::log(total);
-        Self { position_mm, fit: Fit { ln_evidence, change, covariance, after } }
+        Self { position_mm, change, covariance }
     }
 }
 
@@ -274,6 +293,8 @@ struct Fit {
     covariance: Matrix5<f64>,
     /// Number of widths that show some of the step and are no outliers.
     after: usize,
+    /// Number of widths that are outliers.
+    outliers: usize,
 }
 
 /// Normal equations of a [`Fit`].
@@ -316,6 +337,7 @@ impl NormalEquations {
     /// The fit to the widths that have been added. The one that is farthest from it is left out as an
     /// outlier, as long as there is one.
     fn fit(mut self, mut widths: Vec<SeenWidth>) -> Option<Fit> {
+        let all = widths.len();
         loop {
             let cholesky = self.information.cholesky()?;
             let change = cholesky.solve(&self.weighted);
@@ -325,7 +347,9 @@ impl NormalEquations {
                 let explained = 0.5 * self.weighted.dot(&change);
                 let ln_evidence = explained - self.misfit - 0.5 * cholesky.ln_determinant();
                 let after = widths.iter().filter(|one| one.shows_step()).count();
-                return Some(Fit { ln_evidence, change, covariance: cholesky.inverse(), after });
+                let outliers = all - widths.len();
+                let covariance = cholesky.inverse();
+                return Some(Fit { ln_evidence, change, covariance, after, outliers });
             };
             self.add(&widths.swap_remove(worst), -1.0);
             self.misfit += OUTLIER_MISFIT;
@@ -412,6 +436,25 @@ mod tests {
         assert!((of_flow.size.unwrap() - 0.08).abs() < 0.01, "{of_flow:?}");
         let none = last(0.0, 100.0 + 0.6 * GAUGE, |number| number % 4 == 1);
         assert_eq!(none.size, None);
+    }
+
+    #[test]
+    fn a_change_that_comes_faster_than_the_gauge_sees_a_step_is_followed() {
+        for size in [0.2, -0.2] {
+            let model = known();
+            let ln_width = width(0.0).predicted(&model.estimate());
+            let mut detector = StepDetector::new(GAUGE);
+            // Of another bead, the whole gauge comes into view at once.
+            let after = (1..100).find_map(|number| {
+                let front = 7.6 * f64::from(number);
+                let more = if front > 200.0 { size } else { 0.0 };
+                detector.push(front, width(ln_width + more), model);
+                Some((front - 200.0, change(&model, &detector.find()?)))
+            });
+            let (after_mm, step) = after.unwrap();
+            assert!(after_mm < KEPT_GAUGES * GAUGE + KEPT_MM, "{after_mm}");
+            assert!((step / size - 1.0).abs() < 0.1, "{step}");
+        }
     }
 
     #[test]
