@@ -35,7 +35,6 @@ use crate::core::{Mm, MmPerS, Rpm, Span, Stamp};
 use exponent::Exponent;
 use flow_step::StepDetector;
 use outlier_run::OutlierRun;
-use pulsating_bead::PulsationSample;
 use pulsation::FlowPulsation;
 pub use pulsation::PERIODS_S;
 pub use pulse_counter::ScrewPulses;
@@ -151,7 +150,7 @@ impl DistanceController {
         self.steps.clear();
         self.outliers = OutlierRun::default();
         self.model.begin_bead();
-        self.pulsation.loosen(BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA);
+        self.pulsation.shift(0.0, BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA);
         self.noise.begin_bead();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
@@ -174,7 +173,7 @@ impl DistanceController {
     pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading) -> DistanceTrace {
         self.check_history(nozzle_path.get());
         let taken = match self.match_speed(nozzle_path.get(), width) {
-            Some(sample) => self.take_sample(&sample),
+            Some(sample) => self.take_sample(sample),
             None => WidthUse::NotMatched,
         };
         self.trace(taken)
@@ -196,8 +195,9 @@ impl DistanceController {
         if !self.is_ready() || width <= Mm::ZERO {
             return None;
         }
-        let ExpectedBead { ln_width, exponent, .. } =
-            self.bead_between(from.secs(), (from + lasts).secs());
+        let laid_s = from.secs()..(from + lasts).secs();
+        let ExpectedBead { ln_width, exponent } =
+            self.pulsation.bead(&laid_s, self.model.expected());
         let ln_speed = (ln_width - width.get().ln()) / exponent;
         let speed = self.settings.reference_speed.get()
             * ln_speed.clamp(-MAX_LN_SPEED_RATIO, MAX_LN_SPEED_RATIO).exp();
@@ -234,68 +234,49 @@ impl DistanceController {
         MatchedWidth::new(&self.speed_history, gauge, reading, self.model.exponent())
     }
 
-    fn take_sample(&mut self, sample: &MatchedWidth) -> WidthUse {
+    fn take_sample(&mut self, mut sample: MatchedWidth) -> WidthUse {
         let spacing = self.model.distance_to(sample.position_mm);
         let drift = self.drift_per_mm() * spacing;
-        let width_variance = sample.noise + self.noise.variance(spacing);
+        sample.observation.variance += self.noise.variance(spacing);
         self.model.advance_to(sample.position_mm, drift);
-        if let Some(wider) = self.model.move_to(sample.ln_speed) {
+        if let Some(wider) = self.model.move_to(sample.observation.ln_speed) {
             self.pulsation.widen_exponent(&wider);
         }
-        self.pulsation.see(sample.laid_s);
-        if self.pulsation.is_found() {
-            let expected = self.bead_between(sample.laid_s, sample.laid_s);
-            self.model.take_exponent(&expected, sample.ln_speed);
+        if self.settings.cancels_pulsation {
+            self.pulsation.see(&sample.laid_s);
         }
-        let half = 0.5 * sample.lasted_s;
-        let (from_s, to_s) = (sample.laid_s - half, sample.laid_s + half);
-        let pulsation = self.pulsation.mean(from_s, to_s);
-        let variance = width_variance + self.pulsation.variance(from_s, to_s);
-        let mut observation = WidthObservation {
-            ln_width: sample.ln_width - pulsation,
-            ln_speed: sample.ln_speed,
-            ln_speed_beside: sample.ln_speed_beside,
-            variance,
-        };
-        let innovation = self.model.innovation(&observation);
+        if self.pulsation.is_found() {
+            let expected = self.pulsation.bead(&sample.laid_s, self.model.expected());
+            self.model.take_exponent(expected.exponent, sample.observation.ln_speed);
+        }
+        let ln_width = sample.observation.ln_width - self.pulsation.mean(&sample.laid_s);
+        let mut steady = WidthObservation { ln_width, ..sample.observation };
         if !self.steps.is_under_way() && self.model.is_known() {
+            let innovation = self.model.innovation(&steady);
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
-        observation.variance *= self.noise.excess();
-        let taken = self.update(sample, &observation);
+        steady.variance *= self.noise.excess();
+        let taken = self.update(sample.position_mm, &steady);
         // Outliers and widths within a step say nothing of a pulsation.
         let is_used = !matches!(taken, WidthUse::Change | WidthUse::Outlier);
         if is_used && self.settings.cancels_pulsation {
-            let MatchedWidth { laid_s, lasted_s, ln_width, ln_speed, .. } = *sample;
-            let variance = width_variance + sample.offset_variance;
-            self.pulsation.update(&PulsationSample {
-                laid_s,
-                lasted_s,
-                ln_width,
-                ln_speed,
-                variance,
-                drift,
-            });
+            self.pulsation.update(&sample.observation, &sample.laid_s, drift);
         }
         taken
     }
 
     /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
-    fn update(&mut self, sample: &MatchedWidth, observation: &WidthObservation) -> WidthUse {
+    fn update(&mut self, position_mm: f64, observation: &WidthObservation) -> WidthUse {
         if !self.model.is_known() {
             self.model.update(observation, false);
             return WidthUse::Taken;
         }
-        let front = sample.position_mm + 0.5 * self.settings.gauge.get();
+        let front = position_mm + 0.5 * self.settings.gauge.get();
         self.steps.push(front, *observation, self.model);
-        let was_under_way = self.steps.is_under_way();
         if let Some(model) = self.steps.find() {
             let predicted = |model: &WidthModel| observation.predicted(&model.estimate());
             let change = predicted(&model) - predicted(&self.model);
-            self.pulsation.shift(change);
-            if !was_under_way {
-                self.pulsation.loosen(change * change);
-            }
+            self.pulsation.shift(change, change * change);
             self.model = model;
             self.outliers = OutlierRun::default();
             return WidthUse::Change;
@@ -312,11 +293,6 @@ impl DistanceController {
         let informs = self.model.informs_exponent(observation) && !self.pulsation.is_found();
         self.model.update(observation, informs);
         WidthUse::Taken
-    }
-
-    /// The bead that is laid between two times \[s\].
-    fn bead_between(&self, from_s: f64, to_s: f64) -> ExpectedBead {
-        self.pulsation.bead(from_s, to_s, self.model.expected())
     }
 
     fn drift_per_mm(&self) -> f64 {
@@ -345,4 +321,4 @@ const MAX_UNMATCHED_MM: f64 = 50.0;
 /// finite; the speed limits act long before.
 const MAX_LN_SPEED_RATIO: f64 = 5.0;
 /// Error of the offset that a sample allows for, in standard deviations.
-const OFFSET_SIGMAS: f64 = 2.0;
+pub const OFFSET_SIGMAS: f64 = 2.0;

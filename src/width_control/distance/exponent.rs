@@ -10,6 +10,9 @@ const SIGMA: f64 = 0.4;
 const RANGE: (f64, f64) = (0.7, 2.2);
 /// Largest standard deviation of b at an end of its range, as a fraction of its initial value.
 const SIGMA_AT_RANGE_END: f64 = 0.3;
+/// Variance of a constant exponent: a covariance with it can be inverted. Derived: a standard deviation
+/// of 10⁻⁷ moves no width by what a camera sees.
+const CONSTANT_VARIANCE: f64 = 1e-14;
 
 /// The exponent as the cell states it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,26 +25,22 @@ pub struct Exponent {
 
 impl Exponent {
     /// Its variance before the first width.
-    pub fn prior_variance(&self) -> f64 {
-        if self.learns { (SIGMA * self.prior).powi(2) } else { 0.0 }
+    pub fn variance(&self) -> f64 {
+        if self.learns { (SIGMA * self.prior).powi(2) } else { CONSTANT_VARIANCE }
     }
 
     /// Clamps b, the second component of a state, to its range, and moves the others along the
-    /// correlation.
+    /// correlation. The range of a constant exponent is its value.
     pub fn keep_in_range(&self, state: &mut Vector4<f64>, covariance: &mut Matrix4<f64>) {
-        let (min, max) = RANGE;
+        let (min, max) = if self.learns { RANGE } else { (1.0, 1.0) };
         let within = state.y.clamp(min * self.prior, max * self.prior);
-        if within != state.y && covariance.m22 > 0.0 {
-            self.move_to(within, state, covariance);
+        if within != state.y {
+            let variance = covariance.m22;
+            let slopes = covariance.column(1) / variance;
+            *state += slopes * (within - state.y);
+            state.y = within;
+            *covariance -= slopes * slopes.transpose() * variance;
+            covariance.m22 = variance.min((SIGMA_AT_RANGE_END * self.prior).powi(2));
         }
-    }
-
-    fn move_to(&self, within: f64, state: &mut Vector4<f64>, covariance: &mut Matrix4<f64>) {
-        let variance = covariance.m22;
-        let slopes = covariance.column(1) / variance;
-        *state += slopes * (within - state.y);
-        state.y = within;
-        *covariance -= slopes * slopes.transpose() * variance;
-        covariance.m22 = variance.min((SIGMA_AT_RANGE_END * self.prior).powi(2));
     }
 }

@@ -1,21 +1,21 @@
 //! A steady pulsation of the flow by pump or screw: a multiple-model filter with one
-//! hypothesis for each period and some without a pulsation, weighted by their likelihoods. Where
-//! pulses are counted by the speed of a screw, there is one period: a pulse.
+//! hypothesis for each frequency and some without a pulsation, weighted by their likelihoods. Where
+//! pulses are counted by the speed of a screw, there is one frequency: that of the pulses.
 
 use std::ops::Range;
 
 use super::exponent::Exponent;
-use super::pulsating_bead::{LaidInterval, PulsatingBead, PulsationSample, Turn};
+use super::pulsating_bead::{Phases, PulsatingBead};
 use super::pulse_counter::{PulseCounter, ScrewPulses};
-use super::width_model::{ExpectedBead, WiderExponent};
+use super::width_model::{ExpectedBead, WiderExponent, WidthObservation};
 use crate::core::Rpm;
 
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
 /// followed as drift.
 pub const PERIODS_S: (f64, f64) = (0.55, 10.0);
-/// Periods in an octave. Derived: over 10 periods a harmonic that is off by half a step, 1 %, loses a
+/// Frequencies in an octave. Derived: over 10 periods a harmonic that is off by half a step, 1 %, loses a
 /// tenth of a period.
-const PERIODS_IN_OCTAVE: u8 = 35;
+const FREQUENCIES_IN_OCTAVE: u8 = 35;
 /// Drifts of a flow without a pulsation over the stated one, as variances. Without the larger ones a
 /// restless flow would be taken for a pulsation.
 const DRIFT_RATIOS: [f64; 3] = [1.0, 10.0, 100.0];
@@ -25,61 +25,46 @@ const PRIOR_LOG_ODDS: f64 = 14.0;
 /// Time constant of the log likelihoods \[s\]. Derived: two of the longest periods. A larger one
 /// gives up a wrong period later.
 const MEMORY_S: f64 = 20.0;
-/// Periods that must have been seen before one is used. Derived: a part of one may be a drift. Until
-/// then it keeps its weight, and says nothing.
-const MIN_PERIODS: f64 = 1.0;
+/// Log odds below which a hypothesis sinks no further: one that is true after all has to win them back.
+const LEAST_LOG_ODDS: f64 = -2.0 * PRIOR_LOG_ODDS;
 /// Hypotheses of smaller weight are left out of sums, for speed.
 const MIN_WEIGHT: f64 = 1e-3;
-/// Part of a pulsation that the mean over a gauge must keep for it to be cancelled: less of it is
-/// lost in the noise.
-const MIN_KEPT: f64 = 0.3;
 /// Longest time between two widths over which phases are kept \[s\].
 const LONGEST_GAP_S: f64 = 3.0;
 
-/// Hypotheses of all periods, and of none.
+/// Hypotheses of all frequencies, and of none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowPulsation {
-    /// From the longest period to the shortest, and those without a pulsation.
     hypotheses: Vec<Hypothesis>,
     /// Counts pulses, the unit of the period, where a screw makes them; none where it is seconds.
     counter: Option<PulseCounter>,
-    last: Option<LastWidth>,
+    /// When the last width that was used was laid, in the unit of the period.
+    last: Option<f64>,
     /// When the newest width was laid, whether it was used or not \[s\].
     seen_s: Option<f64>,
     /// Time over which widths have come, in the unit of the period.
     observed: f64,
 }
 
-/// When the last width that was used was laid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct LastWidth {
-    /// In seconds.
-    laid_s: f64,
-    /// In the unit of the period.
-    laid: f64,
-    /// How long the nozzle took for its gauge, in the unit of the period.
-    lasted: f64,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Hypothesis {
     bead: PulsatingBead,
-    /// Logarithm of its likelihood over that of the likeliest.
-    log_ratio: f64,
+    /// Logarithm of its probability, up to a constant that all hypotheses share.
+    log_odds: f64,
     weight: f64,
 }
 
 impl FlowPulsation {
-    /// Before the first width. Without a screw the period is searched for.
+    /// Before the first width. Without a screw the frequency is searched for.
     pub fn new(exponent: Exponent, screw: Option<ScrewPulses>) -> Self {
         let (shortest, longest) = PERIODS_S;
-        let ratio = libm::exp2(1.0 / f64::from(PERIODS_IN_OCTAVE));
-        let searched = std::iter::successors(Some(shortest), |period| Some(period * ratio))
-            .take_while(|period| *period < longest);
-        let periods = if screw.is_some() { vec![1.0] } else { searched.collect() };
+        let ratio = libm::exp2(1.0 / f64::from(FREQUENCIES_IN_OCTAVE));
+        let searched = std::iter::successors(Some(1.0 / longest), |hz| Some(hz * ratio))
+            .take_while(|hz| *hz < 1.0 / shortest);
+        let frequencies = if screw.is_some() { vec![1.0] } else { searched.collect() };
         let pulsating =
-            periods.into_iter().rev().map(|period| PulsatingBead::new(period, 1.0, exponent));
-        let steady = DRIFT_RATIOS.map(|ratio| PulsatingBead::new(f64::INFINITY, ratio, exponent));
+            frequencies.into_iter().map(|frequency| PulsatingBead::new(frequency, 1.0, exponent));
+        let steady = DRIFT_RATIOS.map(|ratio| PulsatingBead::new(0.0, ratio, exponent));
         Self {
             hypotheses: pulsating.chain(steady).map(Hypothesis::new).collect(),
             counter: screw.map(|screw| PulseCounter::new(screw, 1.0 / longest..=1.0 / shortest)),
@@ -101,78 +86,68 @@ impl FlowPulsation {
     fn begin_again(&mut self) {
         (self.last, self.observed) = (None, 0.0);
         for one in &mut self.hypotheses {
-            (one.bead, one.log_ratio, one.weight) = (one.bead.begin_again(), 0.0, 0.0);
+            one.bead.begin_again();
+            *one = Hypothesis::new(one.bead);
         }
     }
 
-    /// A width has come, whether it will be used or not. After a gap, and where no pulse is counted, phases are
-    /// not known any more.
-    pub fn see(&mut self, laid_s: f64) {
-        let is_after_gap = self.seen_s.is_some_and(|seen| laid_s - seen > LONGEST_GAP_S);
-        if is_after_gap || self.phases(laid_s..laid_s).is_none() {
+    /// A width has come, whether it will be used or not. What was learnt of the probabilities fades.
+    /// After a gap, and where no pulse is counted, phases are not known any more.
+    pub fn see(&mut self, laid_s: &Range<f64>) {
+        let seen = self.seen_s.unwrap_or(laid_s.end);
+        let passed_s = (laid_s.end - seen).max(0.0);
+        if passed_s > LONGEST_GAP_S || self.phases(laid_s).is_none() {
             self.begin_again();
         }
-        self.seen_s = Some(self.seen_s.map_or(laid_s, |seen| seen.max(laid_s)));
+        self.seen_s = Some(seen + passed_s);
+        for one in &mut self.hypotheses {
+            one.log_odds += passed_s / MEMORY_S * (one.prior_log_odds() - one.log_odds);
+        }
     }
 
-    /// Adds one width; one without a phase is not used.
-    pub fn update(&mut self, one: &PulsationSample) {
-        let half = 0.5 * one.lasted_s;
-        let Some(gauge) = self.phases(one.laid_s - half..one.laid_s + half) else { return };
-        let (laid, lasted) = (0.5 * (gauge.start + gauge.end), gauge.end - gauge.start);
-        let new = LastWidth { laid_s: one.laid_s, laid, lasted };
-        let last = self.last.unwrap_or(new);
-        if one.laid_s < last.laid_s {
+    /// Adds a width that was laid over a time \[s\], and the variance of the drift since the width before
+    /// it. One without a phase is not used.
+    pub fn update(&mut self, observation: &WidthObservation, laid_s: &Range<f64>, drift: f64) {
+        let Some(laid) = self.phases(laid_s) else { return };
+        let passed = laid.end - self.last.unwrap_or(laid.end);
+        if passed < 0.0 {
             return;
         }
-        self.last = Some(new);
-        let interval = LaidInterval { after_last: laid - last.laid, lasted };
-        self.observed += interval.after_last;
-        let turns = self.turns(interval);
-        let kept = 1.0 - ((one.laid_s - last.laid_s) / MEMORY_S).min(1.0);
-        for (Hypothesis { bead, log_ratio, .. }, turn) in self.hypotheses.iter_mut().zip(&turns) {
-            *log_ratio = *log_ratio * kept + bead.update(turn, one);
+        self.last = Some(laid.end);
+        self.observed += passed;
+        let phases = self.all_phases(&laid);
+        for (one, phases) in self.hypotheses.iter_mut().zip(&phases) {
+            one.log_odds += one.bead.update(observation, phases, passed, drift);
         }
         self.weigh();
     }
 
-    /// How the harmonic of every hypothesis turns to an interval. Only those of the longest octave are
-    /// computed: half the period is twice the angle.
-    fn turns(&self, to: LaidInterval) -> Vec<Turn> {
-        let mut turns: Vec<Turn> = Vec::with_capacity(self.hypotheses.len());
-        for one in &self.hypotheses {
-            let octave = turns.len().checked_sub(PERIODS_IN_OCTAVE.into());
-            let twice_as_long = octave.and_then(|at| turns.get(at)).filter(|_| one.bead.pulsates());
-            turns.push(twice_as_long.map_or_else(|| one.bead.turn(to), Turn::doubled));
+    /// The phases of all hypotheses at the ends of a time, an octave above others by doubling them.
+    fn all_phases(&self, laid: &Range<f64>) -> Vec<Phases> {
+        let mut all: Vec<Phases> = Vec::with_capacity(self.hypotheses.len());
+        for Hypothesis { bead, .. } in &self.hypotheses {
+            let octave_below = all.len().checked_sub(FREQUENCIES_IN_OCTAVE.into());
+            let of_half = octave_below.and_then(|at| all.get(at)).filter(|_| bead.pulsates());
+            all.push(of_half.map_or_else(|| bead.phases(laid), Phases::doubled));
         }
-        turns
+        all
     }
 
     /// A time \[s\] in the unit of the period; none where no pulse is counted.
-    fn phases(&self, time_s: Range<f64>) -> Option<Range<f64>> {
-        let Some(counter) = &self.counter else { return Some(time_s) };
-        counter.over(&time_s)
-    }
-
-    /// What is laid between two times \[s\]; none before the first width, and where no pulse is
-    /// counted.
-    fn laid_between(&self, from_s: f64, to_s: f64) -> Option<LaidInterval> {
-        let Range { start, end } = self.phases(from_s..to_s)?;
-        let after_last = 0.5 * (start + end) - self.last?.laid;
-        Some(LaidInterval { after_last, lasted: end - start })
+    fn phases(&self, time_s: &Range<f64>) -> Option<Range<f64>> {
+        let Some(counter) = &self.counter else { return Some(time_s.clone()) };
+        counter.over(time_s)
     }
 
     fn weigh(&mut self) {
-        let largest = |of: fn(&Hypothesis) -> f64| {
-            self.hypotheses.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
-        };
-        let likeliest = largest(|one| one.log_ratio);
-        let most_probable = largest(Hypothesis::log_odds) - likeliest;
+        let all = self.hypotheses.iter().map(|one| one.log_odds);
+        let largest = all.fold(f64::NEG_INFINITY, f64::max);
         let mut total = 0.0;
         for one in &mut self.hypotheses {
-            one.log_ratio = (one.log_ratio - likeliest).max(-PRIOR_LOG_ODDS - one.log_prior());
-            let less = one.log_odds() - most_probable;
-            one.weight = if less > -PRIOR_LOG_ODDS { libm::exp(less) } else { 0.0 };
+            let least = LEAST_LOG_ODDS + one.prior_log_odds();
+            one.log_odds = (one.log_odds - largest).max(least);
+            // For speed: smaller ones are too small for any sum.
+            one.weight = if one.log_odds > -PRIOR_LOG_ODDS { libm::exp(one.log_odds) } else { 0.0 };
             total += one.weight;
         }
         for one in &mut self.hypotheses {
@@ -180,60 +155,36 @@ impl FlowPulsation {
         }
     }
 
-    /// The flow has stepped: ln A of every hypothesis has changed.
-    pub fn shift(&mut self, by: f64) {
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.bead.shift(by);
-        }
-    }
-
-    /// ln A of every hypothesis may have changed by a variance.
-    pub fn loosen(&mut self, variance: f64) {
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.bead.loosen(variance);
+    /// ln A of every hypothesis has changed, and is less certain by a variance.
+    pub fn shift(&mut self, by: f64, variance: f64) {
+        for one in &mut self.hypotheses {
+            one.bead.shift(by, variance);
         }
     }
 
     /// b of every hypothesis is less certain.
     pub fn widen_exponent(&mut self, by: &WiderExponent) {
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.bead.widen_exponent(by);
+        for one in &mut self.hypotheses {
+            one.bead.widen_exponent(by);
         }
     }
 
-    /// The bead that is laid between two times \[s\]: the mean of all hypotheses. Without a pulsation
-    /// it is as `steady` says.
-    pub fn bead(&self, from_s: f64, to_s: f64, steady: ExpectedBead) -> ExpectedBead {
-        let laid = self.laid_between(from_s, to_s);
-        let Some((laid, last)) = laid.zip(self.last) else { return steady };
+    /// The bead that is laid over a time \[s\]: the mean of all hypotheses. Without a pulsation it is as
+    /// `steady` says.
+    pub fn bead(&self, laid_s: &Range<f64>, steady: ExpectedBead) -> ExpectedBead {
         let mut expected = steady;
-        let square_of_steady = steady.exponent_variance + steady.exponent.powi(2);
-        let mut square = square_of_steady;
+        let Some(laid) = self.phases(laid_s) else { return steady };
         for Hypothesis { bead, weight, .. } in self.pulsating() {
-            let is_seen = bead.kept_over(last.lasted).abs() > MIN_KEPT;
-            let pulsation = if is_seen { bead.mean(laid) } else { 0.0 };
-            expected.ln_width += weight * (bead.level() + pulsation - steady.ln_width);
+            expected.ln_width += weight * (bead.level() + bead.mean(&laid) - steady.ln_width);
             expected.exponent += weight * (bead.exponent() - steady.exponent);
-            square +=
-                weight * (bead.exponent_variance() + bead.exponent().powi(2) - square_of_steady);
         }
-        expected.exponent_variance = (square - expected.exponent.powi(2)).max(0.0);
         expected
     }
 
-    /// Mean pulsation of ln w of bead laid between two times \[s\].
-    pub fn mean(&self, from_s: f64, to_s: f64) -> f64 {
-        let Some(laid) = self.laid_between(from_s, to_s) else { return 0.0 };
-        self.pulsating().map(|one| one.weight * one.bead.mean(laid)).sum()
-    }
-
-    /// Variance of that mean: of every hypothesis, and between them.
-    pub fn variance(&self, from_s: f64, to_s: f64) -> f64 {
-        let Some(laid) = self.laid_between(from_s, to_s) else { return 0.0 };
-        let mean = self.mean(from_s, to_s);
-        let squares: f64 =
-            self.pulsating().map(|one| one.weight * one.bead.mean_square(laid)).sum();
-        (squares - mean * mean).max(0.0)
+    /// Mean pulsation of ln w of bead that is laid over a time \[s\].
+    pub fn mean(&self, laid_s: &Range<f64>) -> f64 {
+        let Some(laid) = self.phases(laid_s) else { return 0.0 };
+        self.pulsating().map(|one| one.weight * one.bead.mean(&laid)).sum()
     }
 
     /// Whether a pulsation is more probable than none.
@@ -245,27 +196,26 @@ impl FlowPulsation {
     pub fn period_s(&self) -> Option<f64> {
         let best = self.pulsating().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
         let seconds = self.counter.as_ref().map_or(Some(1.0), PulseCounter::period_s)?;
-        self.is_found().then(|| best.bead.period() * seconds)
+        self.is_found().then(|| seconds / best.bead.frequency())
     }
 
-    /// The hypotheses of a pulsation that count. A bead without one has no period that has passed.
+    /// The hypotheses of a pulsation that count, of which a whole period has passed: a part of one may
+    /// be a drift.
     fn pulsating(&self) -> impl Iterator<Item = &Hypothesis> {
-        let has_passed = |one: &Hypothesis| self.observed > MIN_PERIODS * one.bead.period();
+        let has_passed = |one: &Hypothesis| self.observed * one.bead.frequency() > 1.0;
         self.hypotheses.iter().filter(move |one| one.weight > MIN_WEIGHT && has_passed(one))
     }
 }
 
 impl Hypothesis {
     fn new(bead: PulsatingBead) -> Self {
-        Self { bead, log_ratio: 0.0, weight: 0.0 }
+        let mut new = Self { bead, log_odds: 0.0, weight: 0.0 };
+        new.log_odds = new.prior_log_odds();
+        new
     }
 
-    fn log_prior(&self) -> f64 {
+    fn prior_log_odds(&self) -> f64 {
         if self.bead.pulsates() { 0.0 } else { PRIOR_LOG_ODDS }
-    }
-
-    fn log_odds(&self) -> f64 {
-        self.log_ratio + self.log_prior()
     }
 }
 
@@ -278,20 +228,22 @@ mod tests {
 
     const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
 
+    fn width(ln_width: f64, variance: f64) -> WidthObservation {
+        WidthObservation { ln_width, ln_speed: 0.0, ln_speed_beside: [0.0; 2], variance }
+    }
+
     fn watch(seconds: u32, rate_hz: u32, wave: impl Fn(f64) -> f64) -> (FlowPulsation, f64) {
         let mut pulsation = FlowPulsation::new(EXPONENT, None);
         let mut at = 0.0;
         for k in 0..seconds * rate_hz {
             at = f64::from(k) / f64::from(rate_hz);
             let [noise, _] = hash::normal_pair(hash::mix(&[7, u64::from(k)]));
-            pulsation.update(&PulsationSample {
-                laid_s: at,
-                lasted_s: 0.0,
-                ln_width: 3.7 + wave(at) + 0.0086 * noise,
-                ln_speed: 0.0,
-                variance: 0.0086 * 0.0086,
-                drift: 5e-8,
-            });
+            pulsation.see(&(at..at));
+            pulsation.update(
+                &width(3.7 + wave(at) + 0.0086 * noise, 0.0086 * 0.0086),
+                &(at..at),
+                5e-8,
+            );
         }
         (pulsation, at)
     }
@@ -303,7 +255,8 @@ mod tests {
             let (pulsation, last) = watch(seconds, 50, wave);
             let found = pulsation.period_s().unwrap();
             assert!((found / period - 1.0).abs() < 0.03, "{period}: {found}");
-            let off = pulsation.mean(last + 0.8, last + 0.8) - wave(last + 0.8);
+            let then = last + 0.8;
+            let off = pulsation.mean(&(then..then)) - wave(then);
             assert!(off.abs() < 0.3 * 0.03, "{period}: {off}");
         }
     }
@@ -313,7 +266,8 @@ mod tests {
         for rate in [10, 50] {
             let (pulsation, last) = watch(40, rate, |_| 0.0);
             assert_eq!(pulsation.period_s(), None);
-            assert!(pulsation.mean(last + 0.5, last + 0.5).abs() < 1e-3);
+            let then = last + 0.5;
+            assert!(pulsation.mean(&(then..then)).abs() < 1e-3);
         }
     }
 
@@ -326,14 +280,10 @@ mod tests {
             for k in 0..400_u32 {
                 let [walk, noise] = hash::normal_pair(hash::mix(&[seed, u64::from(k)]));
                 ln_width += 7.0 * drift.sqrt() * walk;
-                pulsation.update(&PulsationSample {
-                    laid_s: 0.1 * f64::from(k),
-                    lasted_s: 0.0,
-                    ln_width: ln_width + variance.sqrt() * noise,
-                    ln_speed: 0.0,
-                    variance,
-                    drift,
-                });
+                let at = 0.1 * f64::from(k);
+                let seen = width(ln_width + variance.sqrt() * noise, variance);
+                pulsation.see(&(at..at));
+                pulsation.update(&seen, &(at..at), drift);
                 found += u32::from(pulsation.is_found());
             }
         }

@@ -1,6 +1,8 @@
 //! A width with the speed at which that piece of bead was laid.
 
-use super::width_model::OFFSET_ERROR_VARIANCE;
+use std::ops::Range;
+
+use super::width_model::WidthObservation;
 use crate::core::Mm;
 use crate::width_control::speed_history::SpeedHistory;
 
@@ -36,26 +38,14 @@ pub struct WidthReading {
 }
 
 /// A width with the position, time and speed at which that bead was laid.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MatchedWidth {
     /// Middle of the gauge along the path \[mm\].
     pub position_mm: f64,
-    /// When the nozzle was there \[s\].
-    pub laid_s: f64,
-    /// How long the nozzle took for the gauge \[s\].
-    pub lasted_s: f64,
-    /// Logarithm of the width, corrected to a bead laid at a constant speed of the same
-    /// mean logarithm.
-    pub ln_width: f64,
-    /// Mean of ln(v/v₀) over the gauge.
-    pub ln_speed: f64,
-    /// Variance of `ln_width` by the measurement and the unmodelled flow.
-    pub noise: f64,
-    /// By how much `ln_speed` would differ if the gauge were its tolerance further on, and
-    /// further back.
-    pub ln_speed_beside: [f64; 2],
-    /// Variance of `ln_width` by the uncertain offset.
-    pub offset_variance: f64,
+    /// When the nozzle laid the bead in the gauge \[s\].
+    pub laid_s: Range<f64>,
+    /// The width. Its variance is that of the measurement and of the unmodelled flow.
+    pub observation: WidthObservation,
 }
 
 impl MatchedWidth {
@@ -68,33 +58,29 @@ impl MatchedWidth {
         reading: WidthReading,
         exponent: f64,
     ) -> Option<Self> {
-        let GaugeInterval { centre_mm: position_mm, length_mm, centre_tolerance_mm: off_mm } =
-            gauge;
-        let (width, sigma) = (reading.width.get(), reading.sigma.get());
-        let half = 0.5 * length_mm;
-        let over = history.mean_over(position_mm - half, position_mm + half)?;
-        let beside = |by: f64| history.mean_near(position_mm - half + by, position_mm + half + by);
-        let differs = |by: f64| Some(beside(by)?.mean - over.mean);
-        let ln_speed_beside = [differs(off_mm)?, differs(-off_mm)?];
-        let squares: f64 = ln_speed_beside.iter().map(|by| (exponent * by).powi(2)).sum();
-        let unmodelled =
-            UNMODELLED_RATIO * history.flow_change_over(position_mm - half, position_mm + half)?;
+        let (position_mm, half) = (gauge.centre_mm, 0.5 * gauge.length_mm);
+        let (start, end) = (position_mm - half, position_mm + half);
+        let over = history.mean_over(start, end)?;
+        let differs = |by: f64| Some(history.mean_near(start + by, end + by)?.mean - over.mean);
+        let ln_speed_beside =
+            [differs(gauge.centre_tolerance_mm)?, differs(-gauge.centre_tolerance_mm)?];
+        let unmodelled = UNMODELLED_RATIO * history.flow_change_over(start, end)?;
         if unmodelled > MAX_UNMODELLED_SIGMA {
             return None;
         }
-        let fraction = sigma / width;
-        Some(Self {
-            position_mm,
-            laid_s: history.time_at(position_mm)?,
-            lasted_s: history.time_at(position_mm + half)? - history.time_at(position_mm - half)?,
+        let (width, sigma) = (reading.width.get(), reading.sigma.get());
+        let relative = [sigma / width, MIN_RELATIVE_SIGMA, unmodelled];
+        let observation = WidthObservation {
             // The mean of v^−b exceeds v^−b of the mean ln v: Jensen, to second order.
             ln_width: libm::log(width) - 0.5 * exponent * exponent * over.variance,
             ln_speed: over.mean,
-            noise: fraction * fraction
-                + MIN_RELATIVE_SIGMA * MIN_RELATIVE_SIGMA
-                + unmodelled * unmodelled,
             ln_speed_beside,
-            offset_variance: OFFSET_ERROR_VARIANCE * squares,
+            variance: relative.iter().map(|sigma| sigma * sigma).sum(),
+        };
+        Some(Self {
+            position_mm,
+            laid_s: history.time_at(start)?..history.time_at(end)?,
+            observation,
         })
     }
 }
@@ -122,29 +108,30 @@ mod tests {
     }
 
     #[test]
-    fn far_from_a_change_of_speed_the_offset_adds_no_uncertainty() {
+    fn far_from_a_change_of_speed_the_offset_makes_no_difference() {
         let before = sample_at(40.0);
-        assert!(before.ln_speed_beside == [0.0; 2] && before.ln_speed.abs() < 1e-9);
-        assert!((before.laid_s - 0.4).abs() < 1e-9);
-        assert!((before.noise - (1e-4 + 2.5e-7)).abs() < 1e-12);
-        assert!(before.offset_variance < 1e-3 * before.noise);
+        let WidthObservation { ln_speed, ln_speed_beside, variance, .. } = before.observation;
+        assert!(ln_speed_beside == [0.0; 2] && ln_speed.abs() < 1e-9);
+        assert!(
+            (before.laid_s.start - 0.35).abs() < 1e-9 && (before.laid_s.end - 0.45).abs() < 1e-9
+        );
+        assert!((variance - (1e-4 + 2.5e-7)).abs() < 1e-12);
     }
 
     #[test]
     fn at_a_change_of_speed_the_offset_decides_on_which_side_the_gauge_lies() {
         let at = sample_at(60.0);
         let half = 0.5 * 0.6_f64.ln();
-        let [ahead, behind] = at.ln_speed_beside;
+        let [ahead, behind] = at.observation.ln_speed_beside;
         assert!((ahead - half).abs() < 1e-9 && (behind + half).abs() < 1e-9, "{at:?}");
-        assert!(at.offset_variance > at.noise);
     }
 
     #[test]
     fn the_width_within_the_gauge_is_the_mean_of_the_powers() {
         let at = sample_at(60.0);
         let mean: f64 = 0.5 * (1.0 + 0.6_f64.powf(-0.25));
-        let predicted = -0.25 * at.ln_speed;
-        let found = mean.ln() - (40.0_f64.ln() - at.ln_width);
+        let predicted = -0.25 * at.observation.ln_speed;
+        let found = mean.ln() - (40.0_f64.ln() - at.observation.ln_width);
         assert!((found - predicted).abs() < 1e-4, "{found} {predicted}");
     }
 }

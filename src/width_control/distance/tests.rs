@@ -17,6 +17,7 @@ struct Line {
     /// Path and width, every 2 mm or so.
     laid: Vec<(f64, f64)>,
     frame: u64,
+    seed: u64,
 }
 
 const TARGET: f64 = 42.0;
@@ -42,8 +43,8 @@ fn settings() -> DistanceSettings {
 impl Line {
     fn new(settings: DistanceSettings) -> Self {
         let controller = DistanceController::new(settings);
-        let (now_s, path, speed, frame) = (0.0, 0.0, 112.5, 0);
-        Self { controller, glare: None, now_s, path, speed, laid: Vec::new(), frame }
+        let (now_s, path, speed, frame, seed) = (0.0, 0.0, 112.5, 0, 3);
+        Self { controller, glare: None, now_s, path, speed, laid: Vec::new(), frame, seed }
     }
 
     /// One frame: lay, report, measure, and command from 200 mm on.
@@ -62,7 +63,7 @@ impl Line {
         let seen = self.seen();
         let trace = seen.map(|seen| {
             self.frame += 1;
-            let [random, _] = hash::normal_pair(hash::mix(&[3, self.frame]));
+            let [random, _] = hash::normal_pair(hash::mix(&[self.seed, self.frame]));
             let glares = self.glare.filter(|(from, to, _)| (*from..*to).contains(&self.path));
             let seen = glares.map_or(seen, |(_, _, width)| width);
             let (width, sigma) = (Mm::new(seen + noise * random), Mm::new(noise));
@@ -262,22 +263,26 @@ fn noise_of_the_reported_speed_does_not_change_the_exponent() {
     }
 }
 
-/// RMS error, within a time \[s\], of a bead whose flow pulsates with every turn of a screw that
+/// RMS error, within a time \[s\], of beads whose flow pulsates with every turn of a screw that
 /// becomes faster by 20 % from 25 to 30 s. Its speed is reported 60 ms late, in whole turns a minute.
 fn rms_with_screw(per_turn: Option<f64>, cancels_pulsation: bool, within_s: Range<f64>) -> f64 {
     let valid = Span::from_millis(300);
     let screw_pulses = per_turn.map(|per_turn| ScrewPulses { per_turn, valid });
-    let mut line = Line::new(DistanceSettings { cancels_pulsation, screw_pulses, ..settings() });
+    let settings = DistanceSettings { cancels_pulsation, screw_pulses, ..settings() };
     let speed_ratio = |at: f64| 1.0 + 0.2 * ((at - 25.0) / 5.0).clamp(0.0, 1.0);
-    let (mut turns, mut squares, mut count) = (0.0, 0.0, 0.0);
-    while line.now_s < within_s.end {
-        let reported = (40.3 * speed_ratio(line.now_s - 0.06)).round();
-        line.controller.screw_reported(Stamp::from_secs(line.now_s), Rpm::constant(reported));
-        turns += 40.3 / 60.0 * speed_ratio(line.now_s) * STEP_S;
-        let flow = speed_ratio(line.now_s).powf(0.25) * (1.0 + 0.02 * (TAU * turns).sin());
-        let _ = line.step(0.25, |_| flow, 0.1);
-        if within_s.contains(&line.now_s) {
-            (squares, count) = (squares + line.error().powi(2), count + 1.0);
+    let (mut squares, mut count) = (0.0, 0.0);
+    for seed in 0..6 {
+        let mut line = Line { seed, ..Line::new(settings) };
+        let mut turns = 0.0;
+        while line.now_s < within_s.end {
+            let reported = (40.3 * speed_ratio(line.now_s - 0.06)).round();
+            line.controller.screw_reported(Stamp::from_secs(line.now_s), Rpm::constant(reported));
+            turns += 40.3 / 60.0 * speed_ratio(line.now_s) * STEP_S;
+            let flow = speed_ratio(line.now_s).powf(0.25) * (1.0 + 0.02 * (TAU * turns).sin());
+            let _ = line.step(0.25, |_| flow, 0.1);
+            if within_s.contains(&line.now_s) {
+                (squares, count) = (squares + line.error().powi(2), count + 1.0);
+            }
         }
     }
     f64::sqrt(squares / count)
@@ -286,11 +291,11 @@ fn rms_with_screw(per_turn: Option<f64>, cancels_pulsation: bool, within_s: Rang
 #[test]
 fn a_pulsation_is_cancelled_while_the_screw_becomes_faster() {
     let rms = |per_turn, within_s| rms_with_screw(per_turn, true, within_s);
-    let (counted, searched) = (rms(Some(1.0), 12.0..50.0), rms(None, 12.0..50.0));
-    assert!(counted < searched, "{counted} {searched}");
+    let (counted, ignored) = (rms(Some(1.0), 12.0..50.0), rms_with_screw(None, false, 12.0..50.0));
+    assert!(counted < 0.5 * ignored, "{counted} {ignored}");
     // Bead that was laid while its flow changed has been seen by then.
     let (counted, searched) = (rms(Some(1.0), 31.0..38.0), rms(None, 31.0..38.0));
-    assert!(counted < 0.3 * searched, "{counted} {searched}");
+    assert!(counted < 0.5 * searched, "{counted} {searched}");
 }
 
 #[test]

@@ -18,9 +18,7 @@ pub const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
 const EXPONENT_SIGMA_PER_ROOT: f64 = 0.15;
 /// Variance of either error of the offset, in units of its tolerance. Derived: the tolerance is
 /// two standard deviations.
-pub const OFFSET_ERROR_VARIANCE: f64 = 0.25;
-/// Smallest variance that can be inverted.
-const MIN_VARIANCE: f64 = 1e-14;
+const OFFSET_ERROR_VARIANCE: f64 = 0.25;
 /// Standard deviation of ln A after the first width, which may be an outlier.
 const FIRST_SIGMA: f64 = 0.1;
 /// Standard deviation of the change of ln A from one bead to the next.
@@ -28,8 +26,8 @@ pub const BETWEEN_BEADS_SIGMA: f64 = 0.02;
 /// Normalised innovation squared from which a width is an outlier: 3.5 standard deviations,
 /// once in 2150 widths by chance.
 const OUTLIER_SQUARED: f64 = 12.25;
-/// Normalised innovations squared are clipped at three standard deviations in likelihoods and
-/// slow averages, so that one outlier decides nothing.
+/// Normalised innovations squared are clipped at three standard deviations in likelihoods, so that one
+/// outlier decides nothing.
 pub const MAX_SQUARED_INNOVATION: f64 = 9.0;
 
 /// ln A, b and two errors of the offset, with their covariance. The errors are by how much of its
@@ -50,9 +48,9 @@ pub struct WidthModel {
 /// A width with the speed at which it was laid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthObservation {
-    /// ln w, less the pulsation, corrected for changes of speed within the gauge.
+    /// ln w, corrected to a bead laid at a constant speed of the same mean logarithm.
     pub ln_width: f64,
-    /// ln(v/v₀).
+    /// Mean of ln(v/v₀) over the gauge.
     pub ln_speed: f64,
     /// By how much `ln_speed` would differ if the gauge were the offset's tolerance further on,
     /// and further back.
@@ -68,17 +66,15 @@ pub struct ExpectedBead {
     pub ln_width: f64,
     /// b.
     pub exponent: f64,
-    /// Variance of b.
-    pub exponent_variance: f64,
 }
 
 /// An exponent that is less certain, about the width at a speed, which is as certain as it was.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WiderExponent {
     /// ln(v/v₀) of that speed.
-    pub ln_speed: f64,
+    ln_speed: f64,
     /// By how much the variance of b grows.
-    pub variance: f64,
+    variance: f64,
 }
 
 impl WiderExponent {
@@ -104,21 +100,16 @@ impl WidthInnovation {
         self.by / self.variance.sqrt()
     }
 
-    /// Normalised innovation squared.
-    pub fn normalised_squared(&self) -> f64 {
-        self.by * self.by / self.variance
-    }
-
     /// Whether the width is an outlier.
     pub fn is_outlier(&self) -> bool {
-        self.normalised_squared() > OUTLIER_SQUARED
+        self.by * self.by > OUTLIER_SQUARED * self.variance
     }
 }
 
 impl WidthModel {
     /// Before the first width.
     pub fn new(exponent: Exponent) -> Self {
-        let of_bead = Matrix2::new(1.0, 0.0, 0.0, exponent.prior_variance());
+        let of_bead = Matrix2::new(1.0, 0.0, 0.0, exponent.variance());
         Self {
             state: Vector4::new(0.0, exponent.prior, 0.0, 0.0),
             covariance: with_offset_errors(of_bead),
@@ -154,11 +145,8 @@ impl WidthModel {
     /// best, and is the same wherever the camera may look. Beside a change of the speed an error of
     /// the offset would be taken for one of b.
     pub fn informs_exponent(&self, observation: &WidthObservation) -> bool {
-        let (both, exponent) = (self.covariance.m12, self.covariance.m22);
-        let differs = observation.ln_speed - both / exponent;
-        exponent > 0.0
-            && differs.abs() > MIN_LN_SPEED_DIFFERENCE
-            && !self.informs_offset(observation)
+        let differs = observation.ln_speed - self.covariance.m12 / self.covariance.m22;
+        differs.abs() > MIN_LN_SPEED_DIFFERENCE && !self.informs_offset(observation)
     }
 
     /// Whether a width informs the errors of the offset: one within its tolerance changes it by more
@@ -169,10 +157,8 @@ impl WidthModel {
 
     /// Standard deviation of ln A, given b.
     pub fn sigma(&self) -> f64 {
-        let (level, both, exponent) =
-            (self.covariance.m11, self.covariance.m12, self.covariance.m22);
-        let known = if exponent > 0.0 { both * both / exponent } else { 0.0 };
-        (level - known).max(0.0).sqrt()
+        let both = self.covariance.m12;
+        (self.covariance.m11 - both * both / self.covariance.m22).max(0.0).sqrt()
     }
 
     /// Path from the newest position to another \[mm\]; 0 backwards.
@@ -234,8 +220,7 @@ impl WidthModel {
 
     /// The bead that it expects.
     pub fn expected(&self) -> ExpectedBead {
-        let (ln_width, exponent) = (self.ln_width(), self.exponent());
-        ExpectedBead { ln_width, exponent, exponent_variance: self.covariance.m22 }
+        ExpectedBead { ln_width: self.ln_width(), exponent: self.exponent() }
     }
 
     /// ln A, b and the errors of the offset.
@@ -245,55 +230,35 @@ impl WidthModel {
 
     /// Their covariance.
     pub fn covariance(&self) -> Matrix4<f64> {
-        let mut covariance = self.covariance;
-        // A constant exponent has no variance: the smallest that can be inverted.
-        covariance.m22 = covariance.m22.max(MIN_VARIANCE);
-        covariance
+        self.covariance
     }
 
     /// The model with another estimate.
     pub fn with_estimate(mut self, estimate: Vector4<f64>, covariance: Matrix4<f64>) -> Self {
-        let exponent = self.exponent();
         (self.state, self.covariance) = (estimate, covariance);
-        if self.prior.learns {
-            self.prior.keep_in_range(&mut self.state, &mut self.covariance);
-        } else {
-            self.state.y = exponent;
-        }
+        self.prior.keep_in_range(&mut self.state, &mut self.covariance);
         self
-    }
-
-    /// Takes over a b that was estimated elsewhere, with its variance. The width at ln(v/v₀) stays as
-    /// it is, and as certain.
-    pub fn take_exponent(&mut self, of: &ExpectedBead, ln_speed: f64) {
-        self.state.x += (of.exponent - self.state.y) * ln_speed;
-        self.state.y = of.exponent;
-        let mut to_width = Matrix4::identity();
-        to_width.m12 = -ln_speed;
-        let mut of_width = to_width * self.covariance * to_width.transpose();
-        of_width.row_mut(1).fill(0.0);
-        of_width.column_mut(1).fill(0.0);
-        of_width.m22 = of.exponent_variance;
-        to_width.m12 = ln_speed;
-        self.covariance = to_width * of_width * to_width.transpose();
     }
 
     /// A width is laid at ln(v/v₀). Beyond the speeds of all widths before, b is less certain.
     pub fn move_to(&mut self, ln_speed: f64) -> Option<WiderExponent> {
-        let Some((slowest, fastest)) = self.ln_speeds else {
-            self.ln_speeds = Some((ln_speed, ln_speed));
-            return None;
-        };
+        let (slowest, fastest) = self.ln_speeds.unwrap_or((ln_speed, ln_speed));
         let nearest = ln_speed.clamp(slowest, fastest);
         self.ln_speeds = Some((slowest.min(ln_speed), fastest.max(ln_speed)));
-        let beyond = (ln_speed - nearest).abs();
-        if !self.prior.learns || !self.known || beyond == 0.0 {
+        if !self.known || !self.prior.learns || nearest == ln_speed {
             return None;
         }
+        let beyond = (ln_speed - nearest).abs();
         let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior.prior).powi(2);
         let wider = WiderExponent { ln_speed: nearest, variance };
         wider.widen(&mut self.covariance);
         Some(wider)
+    }
+
+    /// Takes over a b that was estimated elsewhere. The width at ln(v/v₀) stays as it is.
+    pub fn take_exponent(&mut self, exponent: f64, ln_speed: f64) {
+        self.state.x += (exponent - self.state.y) * ln_speed;
+        self.state.y = exponent;
     }
 }
 
@@ -398,15 +363,11 @@ mod tests {
         for k in 0..40 {
             model.update(&observed(3.7, if k < 20 { 0.0 } else { -0.4 }), false);
         }
-        let (there, elsewhere) = (observed(3.7, -0.4), observed(3.7, 0.1));
+        let there = observed(3.7, -0.4);
         let before = model.innovation(&there);
-        let other = ExpectedBead { ln_width: 3.7, exponent: 0.3, exponent_variance: 1e-6 };
-        model.take_exponent(&other, -0.4);
-        let after = model.innovation(&there);
-        assert!((after.by - before.by).abs() < 1e-12);
-        assert!((after.variance - before.variance).abs() < 1e-15);
-        assert!(model.innovation(&elsewhere).variance < 2.0 * before.variance);
-        assert!(model.covariance().cholesky().is_some());
+        model.take_exponent(0.3, -0.4);
+        assert_eq!(model.exponent(), 0.3);
+        assert!((model.innovation(&there).by - before.by).abs() < 1e-12);
     }
 
     #[test]
