@@ -56,6 +56,7 @@ impl Running {
         });
         let watch = BeadWatch::new(WatchSettings {
             offset: OFFSET,
+            offset_sigma: Mm::constant(8.84),
             gauge: GAUGE,
             reference_speed: START_SPEED,
             exponent: Some(0.25),

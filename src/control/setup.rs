@@ -26,6 +26,7 @@ impl Setup {
         let cell = &self.cell;
         WatchSettings {
             offset: cell.camera_offset,
+            offset_sigma: cell.camera_offset_sigma,
             gauge: cell.gauge_length,
             reference_speed: cell.start_speed,
             exponent: self.control.strategy.exponent(),

@@ -8,12 +8,13 @@ mod response;
 
 use offset::OffsetTest;
 pub use offset::WrongOffset;
+use plausible_offsets::View;
 pub use response::NoResponse;
 use response::ResponseTest;
 
 use super::bead_noise::{BeadRoughness, WidthNoise};
 use super::controller::BeadReport;
-use super::distance::WidthReading;
+use super::distance::{OFFSET_SIGMAS, WidthReading};
 use super::speed_history::SpeedHistory;
 use crate::core::{Mm, MmPerS};
 
@@ -22,6 +23,8 @@ use crate::core::{Mm, MmPerS};
 pub struct WatchSettings {
     /// Path length from the nozzle back to the middle of the gauge.
     pub offset: Mm,
+    /// Standard deviation of that distance.
+    pub offset_sigma: Mm,
     /// Length of bead that one width is the mean of.
     pub gauge: Mm,
     /// Any speed: only ratios matter.
@@ -54,14 +57,16 @@ pub struct BeadWatch {
 impl BeadWatch {
     /// Before the first report.
     pub fn new(settings: WatchSettings) -> Self {
-        let WatchSettings { offset, gauge, reference_speed, roughness, .. } = settings;
+        let WatchSettings { offset, offset_sigma, gauge, reference_speed, roughness, .. } =
+            settings;
+        let view = View::new(offset, offset_sigma * OFFSET_SIGMAS, gauge);
         let kept_mm = (1.0 + offset::LARGEST_ERROR) * offset.get() + gauge.get();
         let roughness = WidthNoise::new(roughness, gauge.get()).variance(f64::INFINITY);
         Self {
             offset,
             speeds: SpeedHistory::new(reference_speed.get(), kept_mm),
             // PI control changes the speed in a ramp, which a drift of the flow imitates.
-            response: ResponseTest::new(offset, gauge, roughness, settings.exponent.is_some()),
+            response: ResponseTest::new(view, roughness, settings.exponent.is_some()),
             offset_test: settings
                 .exponent
                 .map(|exponent| OffsetTest::new(offset, gauge, exponent, roughness)),

@@ -276,6 +276,7 @@ mod tests {
     fn found_error(farther_mm: f64, flow: impl Fn(f64) -> f64) -> Option<f64> {
         let mut watch = BeadWatch::new(WatchSettings {
             offset: Mm::constant(OFFSET_MM),
+            offset_sigma: Mm::constant(0.1 * OFFSET_MM),
             gauge: Mm::constant(12.7),
             reference_speed: MmPerS::constant(100.0),
             exponent: Some(0.25),

@@ -4,22 +4,22 @@
 //! that is tried leaves a sum of squares of ln w + b·ln v, with the b that fits best; one that leaves
 //! much more than the best is excluded. A slow change tells nothing: a drift of the flow looks like it.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use crate::core::Mm;
+use crate::numeric::number::to_f64;
 use crate::width_control::speed_history::SpeedHistory;
 
-/// Error of the offset up to which an answer may come sooner or later, as a fraction of it. Derived:
-/// a camera that is a quarter farther back than stated is stated a fifth too near.
-const LARGEST_ERROR: f64 = 0.25;
-/// The same where no place is ever excluded, so that nothing shortens the wait. Derived: two standard
-/// deviations where the cell states none, one [`STEP`] less than [`LARGEST_ERROR`].
-const LARGEST_ERROR_WAITED_FOR: f64 = LARGEST_ERROR - STEP;
-/// Errors that are tried to either side of none. Derived: [`LARGEST_ERROR`] over [`STEP`].
-const STEPS: usize = 5;
-/// From one of them to the next. Derived: a fifth of the largest one, a third of a gauge of 12.7 mm that
-/// is 88.4 mm behind the nozzle.
-const STEP: f64 = 0.05;
+/// Smallest and largest tolerance, as fractions of the offset. Derived: the largest is that of a cell
+/// that states no standard deviation; the smallest a third of a gauge of 12.7 mm that is 88.4 mm behind
+/// the nozzle, within which a change of the speed shows anyway.
+const TOLERANCES: RangeInclusive<f64> = 0.05..=0.2;
+/// Errors that are tried within the tolerance, to either side of none. Derived: a twentieth of the offset
+/// from one to the next at the largest tolerance, a third of that gauge.
+const WITHIN: usize = 4;
+/// The same, with one beyond it: a camera that is a quarter farther back than stated is stated a fifth
+/// too near.
+const STEPS: usize = WITHIN + 1;
 /// Errors that are tried, from the nearest place to the farthest.
 const TRIED: usize = 2 * STEPS + 1;
 /// Path from one width that is used to the next, as a fraction of the gauge. Derived: widths that are
@@ -72,8 +72,7 @@ impl MatchedWidth {
 /// The errors of the offset that this bead has not excluded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlausibleOffsets {
-    offset_mm: f64,
-    gauge_mm: f64,
+    view: View,
     /// Variance of ln w by the roughness over a gauge.
     roughness: f64,
     /// Whether bead that has answered excludes places.
@@ -87,6 +86,24 @@ pub struct PlausibleOffsets {
     sums: [Sums; TRIED],
 }
 
+/// Where the camera looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Length of the gauge \[mm\].
+    gauge_mm: f64,
+    /// From one error of the offset that is tried to the next \[mm\].
+    step_mm: f64,
+}
+
+impl View {
+    /// A gauge at an offset behind the nozzle that is right within a tolerance.
+    pub fn new(offset: Mm, tolerance: Mm, gauge: Mm) -> Self {
+        let (least, most) = (*TOLERANCES.start(), *TOLERANCES.end());
+        let tolerance_mm = tolerance.get().clamp(least * offset.get(), most * offset.get());
+        Self { gauge_mm: gauge.get(), step_mm: tolerance_mm / to_f64(WITHIN) }
+    }
+}
+
 /// Sums over changes from one width to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Sums {
@@ -97,22 +114,23 @@ struct Sums {
 }
 
 impl PlausibleOffsets {
-    /// Before the first width: the camera's offset and the length of the gauge \[mm\], the variance of
-    /// ln w by the roughness over it, and whether bead that has answered excludes places.
-    pub fn new(offset_mm: f64, gauge_mm: f64, roughness: f64, excludes: bool) -> Self {
+    /// Before the first width: where the camera looks, the variance of ln w by the roughness over its
+    /// gauge, and whether bead that has answered excludes places.
+    pub fn new(view: View, roughness: f64, excludes: bool) -> Self {
         let (count, width_squares, sums) = (0.0, 0.0, [Sums::default(); TRIED]);
-        Self { offset_mm, gauge_mm, roughness, excludes, last: None, count, width_squares, sums }
+        Self { view, roughness, excludes, last: None, count, width_squares, sums }
     }
 
     /// Path within which a change of the speed is seen whole, wherever the camera looks \[mm\].
     pub fn span_mm(&self) -> f64 {
-        let largest = if self.excludes { LARGEST_ERROR } else { LARGEST_ERROR_WAITED_FOR };
-        2.0 * largest * self.offset_mm + self.gauge_mm
+        let View { gauge_mm, step_mm } = self.view;
+        let steps = if self.excludes { STEPS } else { WITHIN };
+        2.0 * to_f64(steps) * step_mm + gauge_mm
     }
 
     /// A new bead.
     pub fn clear(&mut self) {
-        *self = Self::new(self.offset_mm, self.gauge_mm, self.roughness, self.excludes);
+        *self = Self::new(self.view, self.roughness, self.excludes);
     }
 
     /// A width about a position \[mm\], by the stated offset; `None` where no speed is known there.
@@ -122,12 +140,13 @@ impl PlausibleOffsets {
         position_mm: f64,
         width: Mm,
     ) -> Option<MatchedWidth> {
-        let half = 0.5 * self.gauge_mm;
+        let View { gauge_mm, step_mm } = self.view;
+        let half = 0.5 * gauge_mm;
         let mut ln_speeds = [0.0; TRIED];
-        let mut laid_mm = position_mm + LARGEST_ERROR * self.offset_mm;
+        let mut laid_mm = position_mm + to_f64(STEPS) * step_mm;
         for ln_speed in &mut ln_speeds {
             *ln_speed = speeds.mean_near(laid_mm - half, laid_mm + half)?.mean;
-            laid_mm -= STEP * self.offset_mm;
+            laid_mm -= step_mm;
         }
         ln_speeds[STEPS] = speeds.mean_over(position_mm - half, position_mm + half)?.mean;
         Some(MatchedWidth { position_mm, ln_width: libm::log(width.get()), ln_speeds })
@@ -142,7 +161,7 @@ impl PlausibleOffsets {
             self.last = Some(*one);
             return;
         };
-        if one.position_mm - last.position_mm < SPACING_RATIO * self.gauge_mm {
+        if one.position_mm - last.position_mm < SPACING_RATIO * self.view.gauge_mm {
             return;
         }
         self.last = Some(*one);
@@ -166,8 +185,7 @@ impl PlausibleOffsets {
     /// are tried.
     pub fn plausible(&self) -> Range<usize> {
         if !self.excludes {
-            // Up to the largest error that is waited for.
-            return 1..TRIED - 1;
+            return STEPS - WITHIN..STEPS + WITHIN + 1;
         }
         if self.count == 0.0 {
             return 0..TRIED;
@@ -198,7 +216,8 @@ mod tests {
 
     #[test]
     fn changes_of_one_kind_exclude_no_more_by_being_many() {
-        let mut offsets = PlausibleOffsets::new(88.4, 12.7, 2.6e-6, true);
+        let view = View::new(Mm::constant(88.4), Mm::constant(17.7), Mm::constant(12.7));
+        let mut offsets = PlausibleOffsets::new(view, 2.6e-6, true);
         for number in 0..400_u32 {
             let [nearest, other] = hash::normal_pair(hash::mix(&[1, u64::from(number)]));
             let [flow, _] = hash::normal_pair(hash::mix(&[2, u64::from(number)]));

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::plausible_offsets::{MatchedWidth, PlausibleOffsets};
+use super::plausible_offsets::{MatchedWidth, PlausibleOffsets, View};
 use crate::core::{Mm, MmPerS};
 use crate::numeric::rank;
 use crate::width_control::distance::WidthReading;
@@ -72,12 +72,11 @@ struct Change {
 }
 
 impl ResponseTest {
-    /// Before the first width: the camera's offset, the length of the gauge, and the variance of ln w
-    /// by the roughness over it; and whether places at which the camera cannot look are excluded.
-    pub fn new(offset: Mm, gauge: Mm, roughness: f64, excludes_offsets: bool) -> Self {
+    /// Before the first width: where the camera looks, the variance of ln w by the roughness over its
+    /// gauge, and whether places at which the camera cannot look are excluded.
+    pub fn new(view: View, roughness: f64, excludes_offsets: bool) -> Self {
         let (widths, changes) = (VecDeque::new(), VecDeque::new());
-        let (offset_mm, gauge_mm) = (offset.get(), gauge.get());
-        let offsets = PlausibleOffsets::new(offset_mm, gauge_mm, roughness, excludes_offsets);
+        let offsets = PlausibleOffsets::new(view, roughness, excludes_offsets);
         Self { roughness, widths, changes, offsets }
     }
 
@@ -200,6 +199,8 @@ mod tests {
         exponent: f64,
         /// By how much farther back the camera looks than is known \[mm\].
         farther_mm: f64,
+        /// Standard deviation of the offset \[mm\].
+        offset_sigma_mm: f64,
         /// Amplitude of a wave of 100 mm of the flow.
         wave: f64,
         /// Its width over the target, before the step.
@@ -220,6 +221,7 @@ mod tests {
     fn noticed_after(seen: Seen) -> Option<f64> {
         let mut test = BeadWatch::new(WatchSettings {
             offset: Mm::constant(OFFSET_MM),
+            offset_sigma: Mm::constant(seen.offset_sigma_mm),
             gauge: Mm::constant(GAUGE_MM),
             reference_speed: MmPerS::constant(100.0),
             exponent: Some(0.25),
@@ -264,6 +266,7 @@ mod tests {
     const ANSWERS: Seen = Seen {
         exponent: 0.25,
         farther_mm: 0.0,
+        offset_sigma_mm: 0.1 * OFFSET_MM,
         wave: 0.0,
         ratio: 1.05,
         begins_at: 80.0,
@@ -285,6 +288,17 @@ mod tests {
         // Where it is said to look makes no difference to that.
         let farther = noticed_after(Seen { farther_mm: 12.0, ..known }).unwrap();
         assert!((farther - 12.0 - after).abs() < 6.0, "{after} {farther}");
+    }
+
+    #[test]
+    fn an_offset_that_is_known_well_is_waited_for_no_longer() {
+        let unknown = Seen { exponent: 0.0, ..ANSWERS };
+        let known = Seen { offset_sigma_mm: 2.0, ..unknown };
+        let [unknown, after] = [unknown, known].map(|seen| noticed_after(seen).unwrap());
+        assert!(after <= OFFSET_MM + GAUGE_MM && after < unknown - 8.0, "{after} {unknown}");
+        for farther_mm in [-4.0, 4.0] {
+            assert_eq!(noticed_after(Seen { exponent: 0.25, farther_mm, ..known }), None);
+        }
     }
 
     #[test]
