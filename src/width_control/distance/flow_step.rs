@@ -95,6 +95,13 @@ impl StepDetector {
         self.records.push_back(WidthRecord { front_mm, observation, before });
     }
 
+    /// Whether there are as many widths as are kept.
+    fn is_full(&self) -> bool {
+        let ends = self.records.back().zip(self.records.front());
+        let length_mm = ends.map_or(0.0, |(last, first)| last.front_mm - first.front_mm);
+        self.records.len() == MAX_WIDTHS || length_mm > KEPT_GAUGES * self.gauge_mm
+    }
+
     /// Whether a step was found that widths still may change.
     pub fn is_under_way(&self) -> bool {
         self.is_under_way
@@ -178,10 +185,11 @@ impl StepDetector {
     }
 
     /// Positions to try between the ends of the gauges of successive widths, where a step is as likely
-    /// anywhere. Where most widths do not fit without a step, one before all of them too: the change came
-    /// faster than a gauge sees a step, and the model has not followed it.
+    /// anywhere. Where most of all that are kept do not fit without a step, one before them too, as likely
+    /// as within one gauge: the change came faster than a gauge sees a step, and the model has not
+    /// followed it.
     fn positions(&self, without_step: &Fit) -> impl Iterator<Item = Position> {
-        let is_missed = 2 * without_step.outliers > self.records.len();
+        let is_missed = self.is_full() && 2 * without_step.outliers > self.records.len();
         let first = self.records.front().filter(|_| is_missed);
         let first = first.map(|record| record.front_mm - self.gauge_mm);
         let before_all = first.map(|at_mm| Position { at_mm, log_prior: 0.0 });
@@ -454,6 +462,18 @@ mod tests {
             let (after_mm, step) = after.unwrap();
             assert!(after_mm < KEPT_GAUGES * GAUGE + KEPT_MM, "{after_mm}");
             assert!((step / size - 1.0).abs() < 0.1, "{step}");
+        }
+    }
+
+    #[test]
+    fn a_few_outliers_at_the_beginning_are_no_change() {
+        let model = known();
+        let ln_width = width(0.0).predicted(&model.estimate());
+        let mut detector = StepDetector::new(GAUGE);
+        for number in 0..6_u32 {
+            let more = if number == 0 { 0.0 } else { 0.2 };
+            detector.push(1.5 * f64::from(number), width(ln_width + more), model);
+            assert_eq!(detector.find(), None, "{number}");
         }
     }
 

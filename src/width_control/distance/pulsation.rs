@@ -25,7 +25,8 @@ const PRIOR_LOG_ODDS: f64 = 14.0;
 /// Time constant of the log likelihoods \[s\]. Derived: two of the longest periods. A larger one
 /// gives up a wrong period later.
 const MEMORY_S: f64 = 20.0;
-/// Log odds below which a hypothesis sinks no further: one that is true after all has to win them back.
+/// Log odds, beyond the prior ones, below which a hypothesis sinks no further: one that is true after all
+/// has to win them back.
 const LEAST_LOG_ODDS: f64 = -2.0 * PRIOR_LOG_ODDS;
 /// Hypotheses of smaller weight are left out of sums, for speed.
 const MIN_WEIGHT: f64 = 1e-3;

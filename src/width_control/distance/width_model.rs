@@ -255,7 +255,8 @@ impl WidthModel {
         Some(wider)
     }
 
-    /// Takes over a b that was estimated elsewhere. The width at ln(v/v₀) stays as it is.
+    /// Takes over a b that was estimated elsewhere. The width at ln(v/v₀) stays as it is, and the variance
+    /// of b that of this model's own widths.
     pub fn take_exponent(&mut self, exponent: f64, ln_speed: f64) {
         self.state.x += (exponent - self.state.y) * ln_speed;
         self.state.y = exponent;
