@@ -250,7 +250,7 @@ impl Supervisor {
     }
 
     /// A step of the feedforward is due. Returns a command when one is due, and at once when
-    /// the pump has to stop.
+    /// a step of the feedback changes it and when the pump has to stop.
     pub fn tick(&mut self, now: Stamp, laying: Laying) -> Option<ExtruderCommand> {
         let dt = self.last_tick.replace(now).map_or(Span::ZERO, |last| now - last);
         match laying {
@@ -263,8 +263,13 @@ impl Supervisor {
         let command = self.command();
         let ran = self.last_command.is_some_and(|last| last.pump_on);
         let stops = ran && !command.pump_on;
+        // The strategy counts with its command from now on. A link that is slower than the feedback takes
+        // what it can.
+        let is_new = self.last_control == Some(now)
+            && self.setup.control_period >= self.setup.io_period
+            && self.last_command.is_some_and(|last| last != command);
         // Nothing is sent on a connection before its first report.
-        if !(self.io.due(now) || stops) || !self.link_up || self.report.is_none() {
+        if !(self.io.due(now) || is_new || stops) || !self.link_up || self.report.is_none() {
             return None;
         }
         if let Some(sequencer) = self.start_stop.as_mut().filter(|_| ran != command.pump_on) {

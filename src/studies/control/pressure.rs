@@ -1,10 +1,14 @@
 //! The pressure loop where plant, screw and sensor are not what its model says, beside PI control
 //! of the same plant.
 
+mod live;
+mod response;
+
 use std::f64::consts::FRAC_PI_2;
 
 use rayon::prelude::*;
 
+use super::plant::Execution;
 use super::table::{CaseRow, Quantity};
 use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::pressure::{InitialState, PressureError};
@@ -19,6 +23,7 @@ use crate::studies::ma2026::{
     DEAD_TIME_S, Factors, LAG_S, LOAD_RPM, NOISE_MPA2, READ_EVERY, STEP_EVERY, STEP_MPA,
     TestedController,
 };
+use live::LiveRun;
 
 /// Length of a window after a step, in dead times and lags of the plant together.
 const WINDOW: f64 = 10.0;
@@ -43,6 +48,10 @@ const LOOP: &str = "pressure, 50/20 Hz";
 /// Change of speed that the screw does not follow \[rpm\]. Derived: 0.5 rpm of a screw with the 0.02
 /// MPa/rpm of a cell, for one with 1 MPa/rpm.
 const STICTION_RPM: f64 = 0.5 * 0.02;
+
+/// Nothing turns.
+const AT_REST: InitialState =
+    InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
 
 /// A case.
 #[derive(Debug, Clone)]
@@ -154,38 +163,65 @@ impl PressureCase {
         WINDOW * (self.factors.lag * LAG_S + self.factors.dead_time * DEAD_TIME_S)
     }
 
-    /// When the step begins that is judged \[s\]: the target steps, or a screw that was limited since
-    /// then is free.
+    /// When the step begins that is judged \[s\], after the target has stepped: with it, or when a
+    /// screw that was limited since then is free.
     fn step_at_s(&self) -> f64 {
-        if self.is_limited { BEFORE_S + self.window_s() } else { BEFORE_S }
+        if self.is_limited { self.window_s() } else { 0.0 }
     }
 
-    /// When the load comes \[s\].
+    /// When the load comes \[s\], after the target has stepped.
     fn load_at_s(&self) -> f64 {
         self.step_at_s() + self.window_s() + REST_S
     }
 
-    /// One run: a step of the target, and one of the load.
-    fn run(&self, tried: TestedController, seed: u64) -> Result<Figures, PressureError> {
-        let running = InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
-        let mut controller = tried.controller(running)?;
-        let mut disturbed = self.disturbed.clone();
-        disturbed.seed = seed;
+    /// When all has been seen \[s\], after the target has stepped.
+    fn end_s(&self) -> f64 {
+        self.load_at_s() + self.window_s() + REST_S
+    }
+
+    /// The plant at rest, whose load comes some time after it began \[s\].
+    fn plant(&self, seed: u64, load_at_s: f64) -> Result<SimPressure, PressureError> {
         let rpm = LOAD_RPM / self.factors.gain;
-        disturbed.load = Some(LoadChange { at_s: self.load_at_s(), rpm });
-        let mut plant = SimPressure::new(self.factors.process()?, disturbed, FASTEST, running);
+        let load = Some(LoadChange { at_s: load_at_s, rpm });
+        let disturbed = Disturbances { seed, load, ..self.disturbed.clone() };
+        Ok(SimPressure::new(self.factors.process()?, disturbed, FASTEST, AT_REST))
+    }
+
+    /// One run: a step of the target, and one of the load.
+    fn run(
+        &self,
+        execution: Execution,
+        tried: TestedController,
+        seed: u64,
+    ) -> Result<Figures, ReproduceError> {
+        let pressures = match execution {
+            Execution::Simulated => self.simulate(tried, seed)?,
+            Execution::Rehearsed => {
+                let plant = self.plant(seed, self.load_at_s())?;
+                let takes_s = self.end_s();
+                LiveRun { plant, stuck: None, controller: tried, takes_s, seed }.run()?.pressures
+            }
+        };
+        Ok(self.figures(&pressures))
+    }
+
+    /// The pressures since the target has stepped, of a plant that a controller commands by itself.
+    fn simulate(&self, tried: TestedController, seed: u64) -> Result<Vec<f64>, PressureError> {
+        let mut controller = tried.controller(AT_REST)?;
+        let mut plant = self.plant(seed, BEFORE_S + self.load_at_s())?;
         let limited = Rpm::new(LIMITED_TO * STEP_MPA / self.factors.gain).unwrap_or_default();
         if self.is_limited {
             plant.limit(limited);
         }
-        let end_s = self.load_at_s() + self.window_s() + REST_S;
-        let mut pressures = Vec::with_capacity(to_count(end_s / TICK_S) + 1);
+        let mut pressures = Vec::with_capacity(to_count(self.end_s() / TICK_S) + 1);
         let mut tick = 0_u64;
-        while plant.now_s() < end_s {
+        while plant.now_s() < BEFORE_S + self.end_s() {
             let now_s = plant.now_s();
             let now = Stamp::from_secs(now_s);
-            pressures.push(plant.pressure());
-            let is_free = now_s >= self.step_at_s();
+            if now_s >= BEFORE_S {
+                pressures.push(plant.pressure());
+            }
+            let is_free = now_s >= BEFORE_S + self.step_at_s();
             if self.is_limited && is_free {
                 plant.limit(FASTEST);
             }
@@ -204,7 +240,7 @@ impl PressureCase {
             plant.advance();
             tick += 1;
         }
-        Ok(self.figures(&pressures))
+        Ok(pressures)
     }
 
     fn figures(&self, pressures: &[f64]) -> Figures {
@@ -249,16 +285,23 @@ fn range(pressures: &[f64]) -> f64 {
 /// The rows of the study.
 pub fn rows(seeds: u64, progress: &mut Progress) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = nominal_rows()?;
-    for case in cases() {
-        rows.extend(case.rows(seeds)?);
-        progress.advance();
+    for execution in Execution::ALL {
+        for case in cases() {
+            // Live, a screw that does not turn as it is told to stops the robot.
+            if execution == Execution::Simulated || !case.is_limited {
+                rows.extend(case.rows(execution, seeds)?);
+            }
+            progress.advance();
+        }
     }
+    rows.extend(response::rows(seeds)?);
+    progress.advance();
     Ok(rows)
 }
 
 /// Number of steps of progress.
 pub fn count() -> usize {
-    cases().len()
+    Execution::ALL.len() * cases().len() + 1
 }
 
 fn row(case: &str, quantity: Quantity, seeds: usize, found: Estimate, required: f64) -> CaseRow {
@@ -269,7 +312,7 @@ fn row(case: &str, quantity: Quantity, seeds: usize, found: Estimate, required: 
 /// Nothing wrong, without noise: one run says all.
 fn nominal_rows() -> Result<Vec<CaseRow>, ReproduceError> {
     let case = PressureCase::of("nothing wrong, no noise", Disturbances::default());
-    let found = case.run(TestedController::Predictive, 0)?;
+    let found = case.run(Execution::Simulated, TestedController::Predictive, 0)?;
     let row =
         |quantity, value, required| CaseRow::new(LOOP, &case.name, quantity, 1, value, required);
     Ok(vec![
@@ -289,17 +332,15 @@ impl PressureCase {
     }
 
     /// All of its rows; of two wrong parameters the one that is nearest to what is required.
-    fn rows(&self, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
-        let each = |tried| -> Result<Vec<Figures>, ReproduceError> {
-            (0..seeds).into_par_iter().map(|seed| Ok(self.run(tried, seed)?)).collect()
+    fn rows(&self, execution: Execution, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+        let each = |case: &Self, tried| -> Result<Vec<Figures>, ReproduceError> {
+            (0..seeds).into_par_iter().map(|seed| case.run(execution, tried, seed)).collect()
         };
-        let ours = each(TestedController::Predictive)?;
         let free = Self { is_limited: false, ..self.clone() };
-        let theirs: Result<Vec<Figures>, ReproduceError> = (0..seeds)
-            .into_par_iter()
-            .map(|seed| Ok(free.run(TestedController::Pi, seed)?))
-            .collect();
-        let rows = self.judged(&ours, &theirs?);
+        let (ours, theirs) =
+            (each(self, TestedController::Predictive)?, each(&free, TestedController::Pi)?);
+        let case = execution.case(&self.name);
+        let rows = self.judged(&case, &ours, &theirs);
         if self.factors.wrong() < 2 {
             return Ok(rows);
         }
@@ -312,11 +353,10 @@ impl PressureCase {
             .collect())
     }
 
-    fn judged(&self, ours: &[Figures], theirs: &[Figures]) -> Vec<CaseRow> {
+    fn judged(&self, case: &str, ours: &[Figures], theirs: &[Figures]) -> Vec<CaseRow> {
         let our = |figure: fn(&Figures) -> f64| mean_of(ours, figure);
         let their = |figure: fn(&Figures) -> f64| mean(theirs.iter().map(figure));
-        let row =
-            |quantity, found, required| row(&self.name, quantity, ours.len(), found, required);
+        let row = |quantity, found, required| row(case, quantity, ours.len(), found, required);
         let step_iae = their(|run| run.step_iae).min(MOST_IAE);
         let overshoot = if self.is_limited { 0.05 } else { 0.30 };
         vec![
@@ -346,5 +386,23 @@ impl PressureCase {
                 1.1,
             ),
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use super::*;
+
+    /// Commands that wait for the link's next period make the strong ones of a step too long.
+    #[test]
+    fn live_a_step_of_the_target_overshoots_by_no_more_than_without_a_link() {
+        let case = PressureCase::of("nothing wrong", noisy());
+        for execution in Execution::ALL {
+            let run = |seed| case.run(execution, TestedController::Predictive, seed).unwrap();
+            let overshoot = mean((0..8).map(|seed| run(seed).overshoot));
+            assert!(overshoot < 0.02, "{execution:?}: {overshoot}");
+        }
     }
 }

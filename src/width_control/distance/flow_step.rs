@@ -124,16 +124,14 @@ impl StepDetector {
         let found = self.likely_step(equations, &widths, &without_step);
         let Some(step) = found else {
             let was_under_way = std::mem::take(&mut self.is_under_way);
-            let Fit { change, covariance, .. } = without_step;
-            return self
-                .model_after(&change, &covariance, Matrix4x5::identity())
-                .filter(|_| was_under_way);
+            let model = || self.model_after(&without_step.correction, Matrix4x5::identity());
+            return was_under_way.then(model).flatten();
         };
         self.is_under_way = true;
         // The size of the step is a change of ln A.
         let mut to_state = Matrix4x5::identity();
         to_state.m15 = 1.0;
-        let model = self.model_after(&step.change, &step.covariance, to_state)?;
+        let model = self.model_after(&step.correction, to_state)?;
         let settled_mm = step.position_mm + self.gauge_mm * (1.0 + SETTLED_GAUGES);
         if self.records.back()?.front_mm > settled_mm {
             self.clear();
@@ -141,16 +139,11 @@ impl StepDetector {
         Some(model)
     }
 
-    /// The newest model, with the state to which a change leads, and its covariance.
-    fn model_after(
-        &self,
-        change: &Vector5<f64>,
-        covariance: &Matrix5<f64>,
-        to_state: Matrix4x5<f64>,
-    ) -> Option<WidthModel> {
+    /// The newest model, with the state to which a correction leads, and its covariance.
+    fn model_after(&self, by: &Correction, to_state: Matrix4x5<f64>) -> Option<WidthModel> {
         let (base, newest) = (self.records.front()?.before, self.records.back()?.before);
-        let state = base.estimate() + to_state * change;
-        Some(newest.with_estimate(state, to_state * covariance * to_state.transpose()))
+        let state = base.estimate() + to_state * by.change;
+        Some(newest.with_estimate(state, to_state * by.covariance * to_state.transpose()))
     }
 
     /// The mean of the steps at all positions, if together they are likely enough, and large enough.
@@ -160,10 +153,8 @@ impl StepDetector {
         widths: &[SeenWidth],
         without_step: &Fit,
     ) -> Option<LikelyStep> {
-        let candidates: Vec<Candidate> = self
-            .positions(without_step)
-            .filter_map(|at| self.with_step(equations, widths, at))
-            .collect();
+        let candidates: Vec<Candidate> =
+            self.positions().filter_map(|at| self.with_step(equations, widths, at)).collect();
         let evidence = candidates.iter().map(|one| one.fit.ln_evidence);
         let largest = evidence.clone().reduce(f64::max)?;
         let total: f64 = evidence.map(|one| libm::exp(one - largest)).sum();
@@ -171,7 +162,7 @@ impl StepDetector {
             return None;
         }
         let step = LikelyStep::mean_of(&candidates, largest, total);
-        (self.is_under_way || step.change[STEP].abs() > MIN_SIZE).then_some(step)
+        (self.is_under_way || step.correction.change[STEP].abs() > MIN_SIZE).then_some(step)
     }
 
     /// All widths, without a step, less what a state predicts.
@@ -184,15 +175,20 @@ impl StepDetector {
         self.records.iter().map(seen).collect()
     }
 
+    /// Whether there are as many widths as are kept, and most of them were outliers: a change came faster
+    /// than a gauge sees a step, and the model has not followed it.
+    fn has_missed_one(&self) -> bool {
+        let was_outlier =
+            |record: &&WidthRecord| record.before.innovation(&record.observation).is_outlier();
+        self.is_full() && 2 * self.records.iter().filter(was_outlier).count() > self.records.len()
+    }
+
     /// Positions to try between the ends of the gauges of successive widths, where a step is as likely
-    /// anywhere. Where most of all that are kept do not fit without a step, one before them too, as likely
-    /// as within one gauge: the change came faster than a gauge sees a step, and the model has not
-    /// followed it.
-    fn positions(&self, without_step: &Fit) -> impl Iterator<Item = Position> {
-        let is_missed = self.is_full() && 2 * without_step.outliers > self.records.len();
-        let first = self.records.front().filter(|_| is_missed);
-        let first = first.map(|record| record.front_mm - self.gauge_mm);
-        let before_all = first.map(|at_mm| Position { at_mm, log_prior: 0.0 });
+    /// anywhere. Where one was missed, a position before them too, as likely as all within one gauge.
+    fn positions(&self) -> impl Iterator<Item = Position> {
+        let first = self.records.front().filter(|_| self.has_missed_one());
+        let before_all =
+            first.map(|record| Position { at_mm: record.front_mm - self.gauge_mm, log_prior: 0.0 });
         let between = |last_mm: f64, next_mm: f64| {
             let apart = (next_mm - last_mm) / (MAX_SPACING_GAUGES * self.gauge_mm);
             let pieces = to_count(apart.ceil()).clamp(1, MAX_POSITIONS);
@@ -245,8 +241,7 @@ struct Candidate {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct LikelyStep {
     position_mm: f64,
-    change: Vector5<f64>,
-    covariance: Matrix5<f64>,
+    correction: Correction,
 }
 
 impl LikelyStep {
@@ -254,13 +249,14 @@ impl LikelyStep {
     fn mean_of(candidates: &[Candidate], likeliest: f64, total: f64) -> Self {
         let weight = |one: &Candidate| libm::exp(one.fit.ln_evidence - likeliest) / total;
         let position_mm = candidates.iter().map(|one| weight(one) * one.position_mm).sum();
-        let change: Vector5<f64> = candidates.iter().map(|one| weight(one) * one.fit.change).sum();
+        let by = |one: &Candidate| one.fit.correction;
+        let change: Vector5<f64> = candidates.iter().map(|one| weight(one) * by(one).change).sum();
         let spread = |one: &Candidate| {
-            let off = one.fit.change - change;
-            weight(one) * (one.fit.covariance + off * off.transpose())
+            let off = by(one).change - change;
+            weight(one) * (by(one).covariance + off * off.transpose())
         };
         let covariance = candidates.iter().map(spread).sum();
-        Self { position_mm, change, covariance }
+        Self { position_mm, correction: Correction { change, covariance } }
     }
 }
 
@@ -289,20 +285,24 @@ impl SeenWidth {
     }
 }
 
-/// Component of a [`Fit`] that is the size of the step.
+/// Component of a [`Correction`] that is the size of the step.
 const STEP: usize = 4;
 
-/// Errors of ln A, of b and of the offset, and the size of the step.
+/// Errors of ln A, of b and of the offset, and the size of the step, with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Fit {
-    /// Logarithm of its evidence, without a constant.
-    ln_evidence: f64,
+struct Correction {
     change: Vector5<f64>,
     covariance: Matrix5<f64>,
+}
+
+/// The correction that fits the widths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Fit {
+    correction: Correction,
+    /// Logarithm of its evidence, without a constant.
+    ln_evidence: f64,
     /// Number of widths that show some of the step and are no outliers.
     after: usize,
-    /// Number of widths that are outliers.
-    outliers: usize,
 }
 
 /// Normal equations of a [`Fit`].
@@ -345,7 +345,6 @@ impl NormalEquations {
     /// The fit to the widths that have been added. The one that is farthest from it is left out as an
     /// outlier, as long as there is one.
     fn fit(mut self, mut widths: Vec<SeenWidth>) -> Option<Fit> {
-        let all = widths.len();
         loop {
             let cholesky = self.information.cholesky()?;
             let change = cholesky.solve(&self.weighted);
@@ -355,9 +354,8 @@ impl NormalEquations {
                 let explained = 0.5 * self.weighted.dot(&change);
                 let ln_evidence = explained - self.misfit - 0.5 * cholesky.ln_determinant();
                 let after = widths.iter().filter(|one| one.shows_step()).count();
-                let outliers = all - widths.len();
-                let covariance = cholesky.inverse();
-                return Some(Fit { ln_evidence, change, covariance, after, outliers });
+                let correction = Correction { change, covariance: cholesky.inverse() };
+                return Some(Fit { correction, ln_evidence, after });
             };
             self.add(&widths.swap_remove(worst), -1.0);
             self.misfit += OUTLIER_MISFIT;
@@ -366,138 +364,4 @@ impl NormalEquations {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used, reason = "a test may fail")]
-
-    use super::*;
-    use crate::width_control::distance::exponent::Exponent;
-
-    const GAUGE: f64 = 63.0;
-
-    fn known() -> WidthModel {
-        let mut model = WidthModel::new(Exponent { prior: 0.25, learns: true });
-        for _ in 0..50 {
-            model.update(&width(3.7), false);
-        }
-        model
-    }
-
-    fn width(ln_width: f64) -> WidthObservation {
-        WidthObservation { ln_width, ln_speed: -0.3, ln_speed_beside: [0.0; 2], variance: 3e-5 }
-    }
-
-    /// Change of the predicted ln w, at the speed of the widths.
-    fn change(before: &WidthModel, after: &WidthModel) -> f64 {
-        let predicted = |model: &WidthModel| width(0.0).predicted(&model.estimate());
-        predicted(after) - predicted(before)
-    }
-
-    /// The last of the widths every 1.5 mm over a flow that steps at 100 mm, until the gauge's end has
-    /// come as far as `until`: the size that is found, and whether the step is under way. Widths of
-    /// these numbers are outliers.
-    #[derive(Debug)]
-    struct Last {
-        size: Option<f64>,
-        is_under_way: bool,
-    }
-
-    fn last(size: f64, until: f64, is_outlier: impl Fn(u32) -> bool) -> Last {
-        let model = known();
-        let ln_width = width(0.0).predicted(&model.estimate());
-        let mut detector = StepDetector::new(GAUGE);
-        let mut last = None;
-        let fronts = (0_u32..).map(|number| (number, 60.0 + 1.5 * f64::from(number)));
-        for (number, front) in fronts.take_while(|(_, front)| *front < until) {
-            let fraction = ((front - 100.0) / GAUGE).clamp(0.0, 1.0);
-            let more = if is_outlier(number) { 0.2 } else { 0.0 };
-            detector.push(front, width(ln_width + fraction * size + more), model);
-            last = detector.find().map(|found| change(&model, &found));
-        }
-        Last { size: last, is_under_way: detector.is_under_way() }
-    }
-
-    fn found(size: f64, until: f64) -> f64 {
-        last(size, until, |_| false).size.unwrap()
-    }
-
-    #[test]
-    fn a_quarter_of_a_gauge_is_enough_for_a_step_and_its_size() {
-        for size in [0.08, -0.08, 0.15] {
-            let step = found(size, 100.0 + 0.25 * GAUGE);
-            assert!((step / size - 1.0).abs() < 0.2, "{size}: {step}");
-            let half = found(size, 100.0 + 0.6 * GAUGE);
-            assert!((half / size - 1.0).abs() < 0.05, "{size}: {half}");
-        }
-    }
-
-    #[test]
-    fn without_a_step_and_with_an_outlier_none_is_found() {
-        assert_eq!(last(0.0, 180.0, |_| false).size, None);
-        for outlier in [20, 40, 60] {
-            assert_eq!(last(0.0, 180.0, |number| number == outlier).size, None, "{outlier}");
-        }
-    }
-
-    #[test]
-    fn every_fourth_width_may_be_an_outlier_before_a_step_and_after_it() {
-        let of_flow = last(0.08, 100.0 + 0.6 * GAUGE, |number| number % 4 == 1);
-        assert!((of_flow.size.unwrap() - 0.08).abs() < 0.01, "{of_flow:?}");
-        let none = last(0.0, 100.0 + 0.6 * GAUGE, |number| number % 4 == 1);
-        assert_eq!(none.size, None);
-    }
-
-    #[test]
-    fn a_change_that_comes_faster_than_the_gauge_sees_a_step_is_followed() {
-        for size in [0.2, -0.2] {
-            let model = known();
-            let ln_width = width(0.0).predicted(&model.estimate());
-            let mut detector = StepDetector::new(GAUGE);
-            // Of another bead, the whole gauge comes into view at once.
-            let after = (1..100).find_map(|number| {
-                let front = 7.6 * f64::from(number);
-                let more = if front > 200.0 { size } else { 0.0 };
-                detector.push(front, width(ln_width + more), model);
-                Some((front - 200.0, change(&model, &detector.find()?)))
-            });
-            let (after_mm, step) = after.unwrap();
-            assert!(after_mm < KEPT_GAUGES * GAUGE + KEPT_MM, "{after_mm}");
-            assert!((step / size - 1.0).abs() < 0.1, "{step}");
-        }
-    }
-
-    #[test]
-    fn a_few_outliers_at_the_beginning_are_no_change() {
-        let model = known();
-        let ln_width = width(0.0).predicted(&model.estimate());
-        let mut detector = StepDetector::new(GAUGE);
-        for number in 0..6_u32 {
-            let more = if number == 0 { 0.0 } else { 0.2 };
-            detector.push(1.5 * f64::from(number), width(ln_width + more), model);
-            assert_eq!(detector.find(), None, "{number}");
-        }
-    }
-
-    #[test]
-    fn widths_at_a_point_and_at_one_place_have_steps_too() {
-        let model = known();
-        let mut detector = StepDetector::new(0.0);
-        let mut last = None;
-        for number in 0..20_u32 {
-            let step = if number >= 10 { 0.08 } else { 0.0 };
-            // Two widths at every place.
-            let front = 2.0 * f64::from(number / 2);
-            detector.push(front, width(width(0.0).predicted(&model.estimate()) + step), model);
-            last = detector.find().or(last);
-        }
-        let step = change(&model, &last.unwrap());
-        assert!((step - 0.08).abs() < 0.01, "{step}");
-    }
-
-    #[test]
-    fn a_step_that_lies_behind_the_gauge_is_no_longer_under_way() {
-        let entering = last(0.08, 100.0 + 1.2 * GAUGE, |_| false);
-        assert!(entering.is_under_way, "{entering:?}");
-        assert!((entering.size.unwrap() - 0.08).abs() < 0.004, "{entering:?}");
-        assert!(!last(0.08, 100.0 + 1.28 * GAUGE, |_| false).is_under_way);
-    }
-}
+mod tests;
