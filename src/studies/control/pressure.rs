@@ -2,6 +2,7 @@
 //! of the same plant.
 
 mod live;
+mod machine;
 mod response;
 
 use std::f64::consts::FRAC_PI_2;
@@ -11,7 +12,7 @@ use rayon::prelude::*;
 use super::plant::Execution;
 use super::table::{CaseRow, Quantity};
 use crate::core::{MPa, Rpm, Stamp};
-use crate::extruder::pressure::{InitialState, PressureError};
+use crate::extruder::pressure::PressureError;
 use crate::io::progress::Progress;
 use crate::numeric::average::mean;
 use crate::numeric::estimate::Estimate;
@@ -24,6 +25,7 @@ use crate::studies::ma2026::{
     TestedController,
 };
 use live::LiveRun;
+use machine::{AT_REST, FASTEST, LOOP, noisy};
 
 /// Length of a window after a step, in dead times and lags of the plant together.
 const WINDOW: f64 = 10.0;
@@ -35,23 +37,15 @@ const BEFORE_S: f64 = 1.0;
 const MOST_IAE: f64 = 0.8;
 /// Smallest phase margin of PI control from which a pair of errors is one to judge \[°\].
 const MIN_PHASE_MARGIN_DEG: f64 = 30.0;
-/// Largest speed of the screw \[rpm\], as in Ma et al. 2026.
-const FASTEST: Rpm = Rpm::constant(3.0);
 /// Fraction of the speed that is needed, while the screw is limited.
 const LIMITED_TO: f64 = 0.7;
 /// Levels of a sensor of ten bits. By definition.
 const LEVELS_10_BIT: f64 = 1024.0;
 /// Largest outlier \[MPa\]. Derived: more than three times the target.
 const OUTLIER_MPA: f64 = 2.0;
-/// The loop's name in the table.
-const LOOP: &str = "pressure, 50/20 Hz";
 /// Change of speed that the screw does not follow \[rpm\]. Derived: 0.5 rpm of a screw with the 0.02
 /// MPa/rpm of a cell, for one with 1 MPa/rpm.
 const STICTION_RPM: f64 = 0.5 * 0.02;
-
-/// Nothing turns.
-const AT_REST: InitialState =
-    InitialState { pressure: MPa::ZERO, target: MPa::ZERO, speed: Rpm::ZERO };
 
 /// A case.
 #[derive(Debug, Clone)]
@@ -82,10 +76,6 @@ struct Figures {
 /// Mean of a figure over the seeds.
 fn mean_of(all: &[Figures], figure: impl Fn(&Figures) -> f64) -> Estimate {
     Estimate::of(&all.iter().map(figure).collect::<Vec<f64>>())
-}
-
-fn noisy() -> Disturbances {
-    Disturbances { noise_mpa2: NOISE_MPA2, ..Disturbances::default() }
 }
 
 fn sensed(sensor: SensorFaults) -> Disturbances {

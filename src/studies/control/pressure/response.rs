@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::live::{LiveRun, Stuck};
-use super::{AT_REST, FASTEST, LOOP, noisy};
+use super::machine::{AT_REST, FASTEST, LOOP, noisy};
 use crate::core::{MPa, Rpm, Stamp};
 use crate::extruder::pressure::{InitialState, PressureController, PressureError};
 use crate::numeric::number::to_f64;
@@ -16,17 +16,18 @@ use crate::studies::ma2026::{
     DEAD_TIME_S, LAG_S, LOAD_RPM, READ_EVERY, STEP_EVERY, TestedController, model,
 };
 
-/// Dead times and lags together after which a pressure that does not answer must be noticed.
+/// Dead times and lags together after which a pressure that does not answer must be noticed. Derived:
+/// the answer of a plant that is twice as slow as the model is there by 98 %.
 const NOTICED_WITHIN: f64 = 5.0;
 /// The same on top \[s\]. Derived: two readings, a command, and their ways.
 const LOOP_S: f64 = 0.1;
 /// Time at the first target \[s\]. Derived: ten dead times and lags.
 const SETTLES_S: f64 = 12.5;
-/// Duration of a run without a fault \[s\].
+/// Duration of a run without a fault \[s\]. Derived: ten periods of the slow drift of papers.md, "002".
 const SOUND_S: f64 = 600.0;
-/// Time between two steps of the target of such a run \[s\].
+/// Time between two steps of the target of such a run \[s\]. Derived: twice what a step is judged over.
 const TARGET_EVERY_S: f64 = 30.0;
-/// Seconds in a thousand hours.
+/// Seconds in a thousand hours. By definition.
 const THOUSAND_HOURS_S: f64 = 3.6e6;
 /// Random stream of what is drawn. Derived: the bytes of "stuck".
 const STUCK_STREAM: u64 = 0x0073_7475_636b;
