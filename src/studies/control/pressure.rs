@@ -173,7 +173,7 @@ impl PressureCase {
     fn plant(&self, seed: u64, load_at_s: f64) -> Result<SimPressure, PressureError> {
         let rpm = LOAD_RPM / self.factors.gain;
         let load = Some(LoadChange { at_s: load_at_s, rpm });
-        let disturbed = Disturbances { seed, load, ..self.disturbed.clone() };
+        let disturbed = Disturbances { load, seed, ..self.disturbed.clone() };
         Ok(SimPressure::new(self.factors.process()?, disturbed, FASTEST, AT_REST))
     }
 

@@ -166,7 +166,7 @@ fn alarm_s(seed: u64) -> Result<Option<f64>, PressureError> {
     });
     let mut targets = (10..).map(|index| draw.between(index, 0.3, 0.9));
     let (mut target, mut next_s) = (0.6, TARGET_EVERY_S);
-    let disturbed = Disturbances { seed, gain_waves, load, ..noisy() };
+    let disturbed = Disturbances { gain_waves, load, seed, ..noisy() };
     let mut looped = Loop::new(disturbed, target)?;
     while looped.plant.now_s() < SOUND_S {
         let now_s = looped.plant.now_s();
