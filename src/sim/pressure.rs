@@ -1,6 +1,6 @@
 //! A simulated extruder from the speed of the screw to the pressure at the nozzle: lag and dead
 //! time, a drifting gain, a load at the input, a screw with a limited speed and stiction, and a
-//! sensor with noise, resolution, outliers and lost readings.
+//! sensor with noise, resolution, outliers and lost readings. Either of them may stop to follow.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -47,6 +47,15 @@ pub struct SensorFaults {
     pub lost_fraction: f64,
 }
 
+/// What does not follow any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stuck {
+    /// The sensor: it gives the same reading again and again.
+    Sensor,
+    /// The material: whatever the screw turns at, it conveys what it did before.
+    Material,
+}
+
 /// Disturbances of the process.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Disturbances {
@@ -78,6 +87,10 @@ pub struct SimPressure {
     speed_rpm: f64,
     pressure: f64,
     tick: u64,
+    /// The reading of a sensor that is stuck.
+    held_reading: Option<MPa>,
+    /// The speed \[rpm\] at which the screw has conveyed what it conveys, where the material is stuck.
+    held_rpm: Option<f64>,
 }
 
 impl SimPressure {
@@ -103,6 +116,16 @@ impl SimPressure {
             speed_rpm,
             pressure: running.pressure.get(),
             tick: 0,
+            held_reading: None,
+            held_rpm: None,
+        }
+    }
+
+    /// From now on something does not follow any more.
+    pub fn stick(&mut self, what: Stuck) {
+        match what {
+            Stuck::Sensor => self.held_reading = self.read(),
+            Stuck::Material => self.held_rpm = Some(self.speed_rpm),
         }
     }
 
@@ -124,6 +147,9 @@ impl SimPressure {
 
     /// Reading of the sensor; none where it is lost.
     pub fn read(&self) -> Option<MPa> {
+        if self.held_reading.is_some() {
+            return self.held_reading;
+        }
         let Disturbances { noise_mpa2, seed, sensor, .. } = &self.disturbances;
         let [chance, place, lost] =
             [1, 2, 3].map(|draw| unit(mix(&[FAULT_STREAM, *seed, self.tick, draw])));
@@ -173,7 +199,7 @@ impl SimPressure {
             self.pressure = settled + (self.pressure - settled) * kept;
         }
         self.delayed_speeds.pop_back();
-        self.delayed_speeds.push_front(self.speed_rpm);
+        self.delayed_speeds.push_front(self.held_rpm.unwrap_or(self.speed_rpm));
         self.tick += 1;
     }
 }
@@ -218,6 +244,30 @@ mod tests {
             plant.advance();
         }
         assert!((plant.pressure() - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_stuck_stays_as_it_was() {
+        let process = Fopdt::new(1.0, 0.1, 0.2).unwrap();
+        let disturbed = Disturbances { noise_mpa2: 5e-5, ..Disturbances::default() };
+        let speed = Rpm::constant(0.5);
+        let pressure = MPa::constant(0.5);
+        let running = InitialState { pressure, target: pressure, speed };
+        let plant = SimPressure::new(process, disturbed, Rpm::constant(3.0), running);
+        for stuck in [Stuck::Sensor, Stuck::Material] {
+            let mut plant = plant.clone();
+            let before = plant.read();
+            plant.stick(stuck);
+            plant.command(Rpm::constant(1.0));
+            for _ in 0..400 {
+                plant.advance();
+            }
+            let follows = stuck == Stuck::Sensor;
+            assert_eq!(plant.read() == before, follows, "{stuck:?}");
+            let expected = if follows { 1.0 } else { 0.5 };
+            assert!((plant.pressure() - expected).abs() < 1e-6, "{stuck:?}: {plant:?}");
+            assert!((plant.speed_rpm() - 1.0).abs() < 1e-12, "{stuck:?}");
+        }
     }
 
     #[test]

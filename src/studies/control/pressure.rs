@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::plant::Execution;
 use super::table::{CaseRow, Quantity};
-use crate::core::{MPa, Rpm, Stamp};
+use crate::core::Rpm;
 use crate::extruder::pressure::PressureError;
 use crate::io::progress::Progress;
 use crate::numeric::average::mean;
@@ -21,11 +21,10 @@ use crate::numeric::root::{BISECTIONS, bisect};
 use crate::sim::pressure::{Disturbances, LoadChange, SensorFaults, SimPressure, TICK_S};
 use crate::studies::error::ReproduceError;
 use crate::studies::ma2026::{
-    DEAD_TIME_S, Factors, LAG_S, LOAD_RPM, NOISE_MPA2, READ_EVERY, STEP_EVERY, STEP_MPA,
-    TestedController,
+    DEAD_TIME_S, Factors, LAG_S, LOAD_RPM, NOISE_MPA2, STEP_MPA, TestedController,
 };
 use live::LiveRun;
-use machine::{AT_REST, FASTEST, LOOP, noisy};
+use machine::{AT_REST, FASTEST, LOOP, PressureLoop, noisy};
 
 /// Length of a window after a step, in dead times and lags of the plant together.
 const WINDOW: f64 = 10.0;
@@ -189,7 +188,7 @@ impl PressureCase {
             Execution::Rehearsed => {
                 let plant = self.plant(seed, self.load_at_s())?;
                 let takes_s = self.end_s();
-                LiveRun { plant, stuck: None, controller: tried, takes_s, seed }.run()?.pressures
+                LiveRun { plant, controller: tried, takes_s, seed }.run()?.pressures
             }
         };
         Ok(self.figures(&pressures))
@@ -197,38 +196,27 @@ impl PressureCase {
 
     /// The pressures since the target has stepped, of a plant that a controller commands by itself.
     fn simulate(&self, tried: TestedController, seed: u64) -> Result<Vec<f64>, PressureError> {
-        let mut controller = tried.controller(AT_REST)?;
-        let mut plant = self.plant(seed, BEFORE_S + self.load_at_s())?;
+        let plant = self.plant(seed, BEFORE_S + self.load_at_s())?;
+        let mut looped = PressureLoop::new(plant, tried, AT_REST)?;
         let limited = Rpm::new(LIMITED_TO * STEP_MPA / self.factors.gain).unwrap_or_default();
         if self.is_limited {
-            plant.limit(limited);
+            looped.plant.limit(limited);
         }
         let mut pressures = Vec::with_capacity(to_count(self.end_s() / TICK_S) + 1);
-        let mut tick = 0_u64;
-        while plant.now_s() < BEFORE_S + self.end_s() {
-            let now_s = plant.now_s();
-            let now = Stamp::from_secs(now_s);
-            if now_s >= BEFORE_S {
-                pressures.push(plant.pressure());
+        while looped.plant.now_s() < BEFORE_S + self.end_s() {
+            let (now, now_s) = (looped.now(), looped.plant.now_s());
+            let has_stepped = now_s >= BEFORE_S;
+            if has_stepped {
+                pressures.push(looped.plant.pressure());
             }
-            let is_free = now_s >= BEFORE_S + self.step_at_s();
-            if self.is_limited && is_free {
-                plant.limit(FASTEST);
+            let is_limited = self.is_limited && now_s < BEFORE_S + self.step_at_s();
+            if !is_limited {
+                looped.plant.limit(FASTEST);
             }
-            if tick.is_multiple_of(READ_EVERY) {
-                // Simulated readings are current and plausible.
-                let _ = plant.read().map(|reading| controller.measured(now, reading));
+            let command = looped.advance(if has_stepped { STEP_MPA } else { 0.0 });
+            if is_limited && command.is_some_and(|command| command.speed > limited) {
+                looped.controller.settle(now, limited);
             }
-            if tick.is_multiple_of(STEP_EVERY) {
-                let target = if now_s >= BEFORE_S { STEP_MPA } else { 0.0 };
-                let command = controller.step(now, MPa::new(target).unwrap_or_default());
-                plant.command(command.speed);
-                if self.is_limited && !is_free && command.speed > limited {
-                    controller.settle(now, limited);
-                }
-            }
-            plant.advance();
-            tick += 1;
         }
         Ok(pressures)
     }

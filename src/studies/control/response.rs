@@ -5,10 +5,9 @@ use rayon::prelude::*;
 
 use super::laid_length::LaidLength;
 use super::plant::{Control, Draw, Execution, LoopCell, Plan, TARGET_MM};
-use super::table::{CaseRow, Quantity, quantile};
+use super::table::{CaseRow, Quantity};
 use crate::control::{Command, Event, Hold, State, Step};
 use crate::core::{Mm, Stamp};
-use crate::numeric::number::to_f64;
 use crate::scenario::disturbance::Flow;
 use crate::scenario::table::OtherBead;
 use crate::sim::cell::{FrameObservation, Observer};
@@ -24,8 +23,6 @@ const MAX_GAUGES: f64 = 2.0;
 /// Standard deviation of an offset that was measured: more than the 1.5 mm by which six trials
 /// differ (bcs-thesis, § 3.1.1).
 const KNOWN_OFFSET_SIGMA: Mm = Mm::constant(2.0);
-/// Seconds in a thousand hours.
-const THOUSAND_HOURS_S: f64 = 3.6e6;
 
 /// Trials of one kind.
 #[derive(Debug, Clone, Copy)]
@@ -80,9 +77,7 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
             .filter_map(|(seed, one)| alarm_row(cell, &format!("{case}, seed {seed}"), one))
             .collect();
         let lasted_s: f64 = sound.iter().map(|one| one.lasted_s).sum();
-        let value = THOUSAND_HOURS_S * to_f64(alarms.len()) / lasted_s;
-        let quantity = Quantity::ratio("false alarms in 1,000 h");
-        rows.push(CaseRow::new(cell, &case, quantity, sound.len(), value, 10.0));
+        rows.push(CaseRow::false_alarms(cell, &case, sound.len(), alarms.len(), lasted_s));
         rows.extend(alarms);
     }
     Ok(rows)
@@ -108,15 +103,7 @@ fn fault_rows(
         Plan::new(cell, Control::Distance)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
     // Where the speed hardly changes, there is nothing that the width could answer.
     let after: Vec<f64> = faulty.iter().filter_map(Noticed::after_mm).collect();
-    let late = after.iter().filter(|after| **after > most_mm).count();
-    let fraction = to_f64(late) / to_f64(after.len());
-    let row = |quantity, value, required| {
-        CaseRow::new(cell, case, quantity, after.len(), value, required)
-    };
-    Ok([
-        row(Quantity::ratio("fraction not noticed in time"), fraction, 0.01),
-        row(Quantity::mm("noticed after, median"), quantile(&after, 0.5), most_mm),
-    ])
+    Ok(CaseRow::noticed(cell, case, &after, most_mm, "mm"))
 }
 
 fn observe(

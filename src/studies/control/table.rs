@@ -2,7 +2,11 @@
 
 use serde::Serialize;
 
+use crate::numeric::number::to_f64;
 use crate::numeric::rank;
+
+/// Seconds in a thousand hours. By definition.
+const THOUSAND_HOURS_S: f64 = 3.6e6;
 
 /// One figure of one case in one cell. The names of the fields are the keys of `control.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -75,6 +79,39 @@ impl CaseRow {
             confidence: None,
             required,
         }
+    }
+
+    /// After which time or path a fault was noticed in each of some trials, infinite where it was not:
+    /// how many were late, and the median.
+    pub fn noticed(
+        cell: impl Into<String>,
+        case: &str,
+        after: &[f64],
+        within: f64,
+        unit: &'static str,
+    ) -> [Self; 2] {
+        let cell = cell.into();
+        let late = after.iter().filter(|after| **after > within).count();
+        let fraction = to_f64(late) / to_f64(after.len());
+        let row = |quantity, value, required| {
+            Self::new(cell.clone(), case, quantity, after.len(), value, required)
+        };
+        [
+            row(Quantity::ratio("fraction not noticed in time"), fraction, 0.01),
+            row(Quantity::new("noticed after, median", unit), quantile(after, 0.5), within),
+        ]
+    }
+
+    /// Number of alarms in runs without a fault that have lasted some time together \[s\].
+    pub fn false_alarms(
+        cell: impl Into<String>,
+        case: &str,
+        runs: usize,
+        alarms: usize,
+        lasted_s: f64,
+    ) -> Self {
+        let value = THOUSAND_HOURS_S * to_f64(alarms) / lasted_s;
+        Self::new(cell, case, Quantity::ratio("false alarms in 1,000 h"), runs, value, 10.0)
     }
 
     /// With half of the confidence interval of its value.

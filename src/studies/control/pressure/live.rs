@@ -7,7 +7,7 @@ use crate::assembly::LoadedCell;
 use crate::cell::extruder::Strategy;
 use crate::cell::file::Purpose;
 use crate::control::Step;
-use crate::core::{MPa, Mm, Mm3PerS, Rpm, Span, Stamp};
+use crate::core::{Mm, Mm3PerS, Rpm, Span, Stamp};
 use crate::extruder::pressure::pi::PressurePiGains;
 use crate::extruder::strategy::PressureChoice;
 use crate::extruder::{ExtruderFault, ExtruderReport, ExtruderState};
@@ -25,23 +25,12 @@ const SPARE_S: f64 = 1.0;
 pub struct LiveRun {
     /// The plant, at rest.
     pub plant: SimPressure,
-    /// What stands still from the beginning, if anything does.
-    pub stuck: Option<Stuck>,
     /// Which controller holds the pressure.
     pub controller: TestedController,
     /// Duration from the beginning of the bead on \[s\].
     pub takes_s: f64,
     /// Seed of everything but the plant.
     pub seed: u64,
-}
-
-/// What does not follow any more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stuck {
-    /// The sensor: it gives the same reading again and again.
-    Sensor,
-    /// The material: the screw turns and conveys nothing.
-    Screw,
 }
 
 /// What a run shows, from the beginning of its bead on.
@@ -72,10 +61,8 @@ impl LiveRun {
         let mut extruder = loaded.simulated_extruder()?.ok_or(ReproduceError::NoRun)?.extruder;
         let watched = WatchedPlant {
             plant: self.plant,
-            stuck: self.stuck,
             flow: extruder.nominal_flow,
             elapsed_s: 0.0,
-            held: None,
             pressures: Arc::clone(&pressures),
         };
         extruder.plant = SimExtruder::new(Box::new(watched), Delays::default());
@@ -112,12 +99,9 @@ fn unanswered_s(run: &Rehearsed) -> Option<f64> {
 #[derive(Debug)]
 struct WatchedPlant {
     plant: SimPressure,
-    stuck: Option<Stuck>,
     flow: Mm3PerS,
     /// Time since the plant was last advanced \[s\].
     elapsed_s: f64,
-    /// The reading of a sensor that stands still.
-    held: Option<MPa>,
     pressures: Arc<Mutex<Vec<f64>>>,
 }
 
@@ -127,8 +111,7 @@ impl SimPlant for WatchedPlant {
         if command.is_none() && pressures.is_empty() {
             return;
         }
-        let conveyed = command.filter(|_| self.stuck != Some(Stuck::Screw)).unwrap_or(0.0);
-        self.plant.command(Rpm::new(conveyed).unwrap_or_default());
+        self.plant.command(Rpm::new(command.unwrap_or(0.0)).unwrap_or_default());
         if pressures.is_empty() {
             pressures.push(self.plant.pressure());
         }
@@ -145,11 +128,7 @@ impl SimPlant for WatchedPlant {
     }
 
     fn sense(&mut self, report: &mut ExtruderReport) {
-        let reading = self.plant.read();
-        self.held = self.held.or(reading);
-        report.pressure_mpa = if self.stuck == Some(Stuck::Sensor) { self.held } else { reading };
-        // A screw that conveys nothing turns as it is told to; the plant's stands.
-        let turns = self.stuck != Some(Stuck::Screw);
-        report.screw_rpm = Rpm::new(self.plant.speed_rpm()).ok().filter(|_| turns);
+        report.pressure_mpa = self.plant.read();
+        report.screw_rpm = Rpm::new(self.plant.speed_rpm()).ok();
     }
 }
