@@ -15,6 +15,11 @@ impl Rate {
         Self { period, next: None }
     }
 
+    /// Begins its grid anew: it is due at the next call.
+    pub const fn restart(&mut self) {
+        self.next = None;
+    }
+
     /// Whether it is due at `now`; the first call is, and sets the grid.
     pub fn due(&mut self, now: Stamp) -> bool {
         let Some(next) = self.next else {

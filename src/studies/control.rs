@@ -45,6 +45,20 @@ pub enum Case {
 }
 
 impl Case {
+    /// What happens, in a line.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Steps => "from 38.6 to 42 mm; the flow steps by 8 %",
+            Self::Pulsation => "the flow pulsates, or does not",
+            Self::Mismatch => "offset, exponent, drift and waves are drawn at random",
+            Self::Response => "another bead comes into view; or nothing is wrong",
+            Self::Offset => "the camera's offset is a fifth off",
+            Self::Latency => "frames are stamped late",
+            Self::Faults => "cameras, robots, extruders and disks fail",
+            Self::Pressure => "plant, screw or sensor differ from the pressure loop's model",
+        }
+    }
+
     /// Lays its beads with each seed from 0 on.
     pub fn rows(self, seeds: u64, progress: &mut Progress) -> Result<Vec<CaseRow>, ReproduceError> {
         let of_cell = match self {
@@ -140,26 +154,12 @@ mod tests {
         let rows = pressure::rows(4, &mut progress).unwrap();
         assert!(rows.len() > 300, "{}", rows.len());
         let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
-        // Half the gain and twice the dead time: nothing answers for 0.8 s, and then half of it does.
-        // Live, a reading is up to 20 ms old: with twice the gain the first command goes on for longer.
-        // The last two are met with 30 seeds.
-        let known = [
-            ("gain × 0.5, lag × 1, dead time × 2", "IAE of a step, over PI or 0.8", 1.11),
-            (
-                "live, virtual clock: gain × 0.5, lag × 1, dead time × 2",
-                "IAE of a step, over PI or 0.8",
-                1.17,
-            ),
-            ("live, virtual clock: gain × 2", "overshoot", 33.0),
-            ("live, virtual clock: noise × 2", "IAE of a load, over PI", 1.15),
-            ("live, virtual clock: 10 bit over 35 MPa", "IAE of a load, over PI", 1.15),
-        ];
-        let known = |row: &&CaseRow| {
-            let is_of = |(case, quantity, _): &&(&str, &str, f64)| {
-                row.case == *case && row.quantity == *quantity
-            };
-            known.iter().find(is_of).zip(row.value).is_some_and(|(one, value)| value < one.2)
+        // Met with 30 seeds.
+        let by_chance = |row: &&CaseRow| {
+            row.case == "live, virtual clock: noise × 2"
+                && row.quantity == "IAE of a load, over PI"
+                && row.value.is_some_and(|value| value < 1.15)
         };
-        assert!(missed.iter().all(known), "{missed:#?}");
+        assert!(missed.iter().all(by_chance), "{missed:#?}");
     }
 }

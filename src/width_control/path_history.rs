@@ -5,14 +5,14 @@ use std::collections::VecDeque;
 
 use crate::core::{Mm, MmPerS, RobotState, Span, Stamp};
 
-/// Reports that are kept: 3.2 s at 50 Hz, more than a frame takes from capture to width.
-const MAX_REPORTS: usize = 160;
+/// Time for which reports are kept. Derived: more than a frame takes from capture to width.
+const KEPT: Span = Span::from_millis(3200);
 /// Longest extrapolation beyond the newest report. After this time the link counts as lost
 /// (`docs/src/reference/robot-link.md`, § Connections).
 const MAX_EXTRAPOLATION: Span = Span::from_millis(500);
 
 /// The nozzle's path over time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathHistory {
     reports: VecDeque<Report>,
 }
@@ -23,12 +23,6 @@ struct Report {
     path: Mm,
     speed: MmPerS,
     z: Mm,
-}
-
-impl Default for PathHistory {
-    fn default() -> Self {
-        Self { reports: VecDeque::with_capacity(MAX_REPORTS) }
-    }
 }
 
 impl PathHistory {
@@ -43,7 +37,7 @@ impl PathHistory {
         if self.reports.back().is_some_and(|last| state.path_mm < last.path || at <= last.at) {
             self.reports.clear();
         }
-        if self.reports.len() == MAX_REPORTS {
+        while self.reports.front().is_some_and(|first| at - first.at > KEPT) {
             self.reports.pop_front();
         }
         let RobotState { path_mm: path, speed_mm_per_s: speed, z_mm: z, .. } = *state;

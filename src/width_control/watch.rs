@@ -29,7 +29,8 @@ pub struct WatchSettings {
     pub gauge: Mm,
     /// Any speed: only ratios matter.
     pub reference_speed: MmPerS,
-    /// b in w = A·(v/v₀)^−b; without it the offset is not tested.
+    /// b in w = A·(v/v₀)^−b; without it the offset is not tested, and bead that has answered does not
+    /// say where the camera looks.
     pub exponent: Option<f64>,
     /// Roughness of the bead.
     pub roughness: BeadRoughness,
@@ -61,15 +62,14 @@ impl BeadWatch {
             settings;
         let view = View::new(offset, offset_sigma * OFFSET_SIGMAS, gauge);
         let kept_mm = (1.0 + offset::LARGEST_ERROR) * offset.get() + gauge.get();
-        let roughness = WidthNoise::new(roughness, gauge.get()).variance(f64::INFINITY);
+        let of_a_width = WidthNoise::new(roughness, gauge.get()).variance(f64::INFINITY);
         Self {
             offset,
             speeds: SpeedHistory::new(reference_speed.get(), kept_mm),
-            // PI control changes the speed in a ramp, which a drift of the flow imitates.
-            response: ResponseTest::new(view, roughness, settings.exponent.is_some()),
+            response: ResponseTest::new(view, roughness, settings.exponent),
             offset_test: settings
                 .exponent
-                .map(|exponent| OffsetTest::new(offset, gauge, exponent, roughness)),
+                .map(|exponent| OffsetTest::new(offset, gauge, exponent, of_a_width)),
         }
     }
 

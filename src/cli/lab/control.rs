@@ -14,7 +14,8 @@ use crate::rows::output;
 use crate::studies::control::Case;
 use crate::studies::control::table::{CaseRow, plain};
 
-/// Controls simulated beads and pressures that are not the model's, with machines that fail.
+/// Controls simulated beads and pressures that differ from the controller's model, with machines that
+/// fail.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
@@ -42,7 +43,7 @@ impl ValueEnum for Case {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(<&'static str>::from(*self)))
+        Some(PossibleValue::new(<&'static str>::from(*self)).help(self.about()))
     }
 }
 

@@ -191,7 +191,8 @@ impl PlantModel {
 }
 
 impl GridModel {
-    const GIVEN: Self = Self { gain: 1.0, lag: GIVEN_LAG, dead_time: 1.0 };
+    /// The given model.
+    pub const GIVEN: Self = Self { gain: 1.0, lag: GIVEN_LAG, dead_time: 1.0 };
 }
 
 impl Sums {

@@ -16,7 +16,7 @@
 use super::call_times::{CallTimes, InitialState, bounded};
 use super::command_history::CommandHistory;
 use super::load::Load;
-use super::plant_model::PlantModel;
+use super::plant_model::{GridModel, PlantModel};
 use super::residual::Residual;
 use super::target_step::{Answer, TargetStep};
 use super::tuning::Tuning;
@@ -47,6 +47,9 @@ const ANSWER_SINCE_ASKED: f64 = 4.0;
 /// Shortest such time \[s\]: a plant may be much quicker than its readings. Derived: fifty of them in
 /// the loop of Ma et al. 2026.
 const MIN_ANSWER_S: f64 = 1.0;
+/// Standard deviations of a reading within which the filtered residual is its slow average and noise.
+/// Derived: of a filtered reading, 0.58, they are five.
+const NOISE_SIGMAS: f64 = 3.0;
 /// Longest time between two commands that counts \[s\]. Derived: twenty periods of Ma et al. 2026;
 /// a longer one is a stall.
 const MAX_PERIOD_S: f64 = 1.0;
@@ -80,6 +83,8 @@ pub struct PredictiveController {
     awake_until_s: f64,
     /// Time of readings that were left out since the last one that was used \[s\].
     unused_s: f64,
+    /// The moment that the filtered residual shows \[s\].
+    shown_at_s: f64,
     period_s: f64,
 }
 
@@ -105,6 +110,7 @@ impl PredictiveController {
             integral: 0.0,
             awake_until_s: f64::NEG_INFINITY,
             unused_s: 0.0,
+            shown_at_s: f64::NEG_INFINITY,
             period_s: tuning.periods.command_s,
         }
     }
@@ -163,14 +169,25 @@ impl PredictiveController {
         self.plant.begin_step(now_s);
     }
 
-    /// Uses the model that the answer to a step has shown. What the feedback has done until now
-    /// belongs to that model's feedforward.
+    /// Uses the model that the answer to a step has shown.
     fn adapt(&mut self, now_s: f64) {
         let Some(step) = &mut self.step else { return };
-        let Some(likeliest) = self.plant.likeliest() else { return };
+        let Some(likeliest) = self.plant.likeliest() else {
+            // What a sensor is stuck at may look like a small answer for a while.
+            if step.answered_s.take().is_some() {
+                self.use_model(now_s, GridModel::GIVEN);
+            }
+            return;
+        };
         step.answered_s.get_or_insert(now_s);
+        self.use_model(now_s, likeliest);
+    }
+
+    /// Uses a model from now on. What the feedback has done until now belongs to that model's
+    /// feedforward.
+    fn use_model(&mut self, now_s: f64, model: GridModel) {
         let (before, arrived) = (self.plant.before_step(), self.plant.arrived(now_s));
-        if !self.plant.adopt(likeliest) {
+        if !self.plant.adopt(model) {
             return;
         }
         // The pressure before the step stays, so that another gain changes the load.
@@ -239,20 +256,29 @@ impl PredictiveController {
         self.drive(from - load, to - next_load)
     }
 
+    /// The residual \[MPa\]: its slow average, where the last readings do not differ from that by
+    /// more than noise.
+    fn shown_residual(&self) -> f64 {
+        let (average, filtered) = (self.load.average(), self.residual.filtered());
+        let is_noise = (filtered - average).abs() < NOISE_SIGMAS * self.residual.sigma();
+        if is_noise { average } else { filtered }
+    }
+
     /// The drive \[MPa\] within what a step of the target allows.
     fn within_step(&mut self, now_s: f64, drive: f64) -> f64 {
         let Some(mut step) = self.step.filter(|step| step.answered_s.is_none()) else {
             return drive;
         };
         let dead_s = self.plant.model().dead_time_s();
-        let delay_s = self.tuning.periods.filter_delay_s();
-        let arrived = self.plant.arrived(now_s - delay_s);
+        let shown_at_s = self.shown_at_s;
+        let arrived = self.plant.arrived(shown_at_s);
         let answer = Answer {
             arrived,
-            arrived_late: self.plant.arrived(now_s - dead_s - delay_s),
-            measured: arrived + self.load.now() + self.residual.filtered(),
+            arrived_before: self.plant.arrived(shown_at_s - self.tuning.periods.reading_s),
+            arrived_late: self.plant.arrived(shown_at_s - dead_s),
+            measured: arrived + self.load.now() + self.shown_residual(),
             sigma: self.residual.sigma(),
-            lateness: (now_s - step.began_s) / (dead_s + delay_s),
+            lateness: (now_s - step.began_s) / (dead_s + now_s - shown_at_s),
             given_gain: self.plant.given_gain_ratio(),
         };
         let bound = step.bound(now_s, self.target, &answer);
@@ -273,6 +299,7 @@ impl PressureController for PredictiveController {
         if !self.residual.update(residual) {
             return Ok(());
         }
+        self.shown_at_s = now.secs() - self.tuning.periods.reading_s;
         let since_s = std::mem::take(&mut self.unused_s);
         if let Some(step) = &self.step {
             let (by, size) = (pressure.get() - step.measured_before(), step.size(self.target));

@@ -112,7 +112,8 @@ impl PressureLoop {
     fn taken_over(&mut self, pressure: MPa) -> Option<ActiveController> {
         let within = self.settings.noise.sigma() * SPIKE_SIGMAS;
         let last = self.first_reading.replace(pressure);
-        last.filter(|last| (pressure - *last).abs() < within)?;
+        let last = last.filter(|last| (pressure - *last).abs() < within)?;
+        let pressure = MPa::new(0.5 * (pressure.get() + last.get())).ok()?;
         // A pressure while the screw stands is left from the last bead, as if the screw had turned
         // at the speed that matches it.
         let matching = pressure.get().max(0.0) / self.settings.model.gain();

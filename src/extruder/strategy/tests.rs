@@ -203,9 +203,10 @@ fn a_pressure_that_does_not_answer_its_target_is_a_fault_before_the_screw_runs_a
     // Five dead times and lags: 6.25 s, of 5 ms a tick.
     let commands = commanded(&mut side, &mut machine, (3000, 4200), Laying::Bead(flow(0.8)), true);
     assert_eq!(side.state(), ExtruderState::Running);
-    // 0.8 MPa need 40 rpm: no more, although the sensor says that 0.6 are there.
+    // 0.8 MPa need 40 rpm: no more than a fifth of the step beyond, although the sensor says that 0.6
+    // are there.
     let last = commands.last().copied().unwrap();
-    assert!((last - 40.0).abs() < 2.0, "{last}");
+    assert!((38.0..42.5).contains(&last), "{last}");
     run(&mut side, &mut machine, (4200, 4300), Laying::Bead(flow(0.8)));
     assert_eq!(side.state(), ExtruderState::Fault(ExtruderFault::NoPressureResponse));
 }

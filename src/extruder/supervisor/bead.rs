@@ -81,6 +81,13 @@ impl Supervisor {
             sequencer.begin(now);
         }
         self.hold_initial_command(now, flow);
+        // A strategy that takes over from readings has the last one before the bead.
+        if let Some((at, report)) = self.report
+            && now - at <= self.setup.max_gap
+            && self.has_required_readings(&report)
+        {
+            self.pass_to_controller(at, &report);
+        }
     }
 
     /// Keeps the first command of the strategy.

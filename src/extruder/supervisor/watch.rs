@@ -105,6 +105,7 @@ impl Supervisor {
         if matches!(self.phase, Phase::Starting { .. }) {
             self.phase = Phase::Running;
             self.last_control = None;
+            self.control.restart();
             self.setup.strategy.controller_mut().settle(now, self.applied);
         }
         self.resume_from(now, ExtruderHold::ValveShut);
@@ -125,7 +126,7 @@ impl Supervisor {
     }
 
     /// Passes a report to the strategy; an implausible one holds until the next plausible one.
-    fn pass_to_controller(&mut self, now: Stamp, report: &ExtruderReport) {
+    pub(super) fn pass_to_controller(&mut self, now: Stamp, report: &ExtruderReport) {
         self.report_usable = self.setup.strategy.controller_mut().reported(now, report).is_ok();
         if !self.report_usable {
             self.hold(now, ExtruderHold::BadReading);
@@ -133,7 +134,7 @@ impl Supervisor {
     }
 
     /// Whether a report has what the strategy and the limit on the pressure need.
-    fn has_required_readings(&self, report: &ExtruderReport) -> bool {
+    pub(super) fn has_required_readings(&self, report: &ExtruderReport) -> bool {
         self.setup.strategy.controller().required_reading().is_none_or(|need| need.met_by(report))
             && (self.setup.max_pressure.is_none() || RequiredReading::Pressure.met_by(report))
     }

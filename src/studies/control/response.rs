@@ -102,7 +102,7 @@ fn fault_rows(
     let most_mm =
         Plan::new(cell, Control::Distance)?.run.camera.offset.get() + MAX_GAUGES * cell.gauge_mm;
     // Where the speed hardly changes, there is nothing that the width could answer.
-    let after: Vec<f64> = faulty.iter().filter_map(Noticed::after_mm).collect();
+    let after: Vec<f64> = faulty.iter().filter_map(|one| one.after_mm(most_mm)).collect();
     Ok(CaseRow::noticed(cell, case, &after, most_mm, "mm"))
 }
 
@@ -170,10 +170,12 @@ impl Noticed {
     }
 
     /// Path from the change of the commanded speed until it was noticed \[mm\]: infinite if it never
-    /// was, `None` if the speed hardly changed.
-    fn after_mm(&self) -> Option<f64> {
-        let commanded = self.commanded_mm?;
-        Some(self.held_mm.map_or(f64::INFINITY, |held| held - commanded))
+    /// was, `None` if the speed hardly changed, or the bead ended before it had to be noticed.
+    fn after_mm(&self, within_mm: f64) -> Option<f64> {
+        let commanded_mm = self.commanded_mm?;
+        let after_mm = |held_mm: f64| held_mm - commanded_mm;
+        let is_missed = !self.complete || self.laid.path_mm > commanded_mm + within_mm;
+        self.held_mm.map(after_mm).or(is_missed.then_some(f64::INFINITY))
     }
 }
 

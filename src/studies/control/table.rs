@@ -119,9 +119,9 @@ impl CaseRow {
         Self { confidence, ..self }
     }
 
-    /// Whether the value is within what is required.
+    /// Whether the value is within what is required; always where nothing is.
     pub fn is_met(&self) -> bool {
-        self.value.is_some_and(|value| value <= self.required)
+        self.required.is_infinite() || self.value.is_some_and(|value| value <= self.required)
     }
 }
 

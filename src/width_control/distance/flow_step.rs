@@ -25,8 +25,8 @@ const MIN_WIDTHS: usize = 3;
 /// Number of the newest widths among which they are looked for. Derived: beyond a step the gauge
 /// shows more and more of it, and every third width may be an outlier.
 const NEWEST_WIDTHS: usize = 5;
-/// Change of a width that counts, in standard deviations. Derived: once in 22 widths by chance,
-/// and three such widths in a row once in 10,000.
+/// Change of a width that counts, in standard deviations. Derived: once in 22 widths by chance, and
+/// three of five once in 1,100.
 const MIN_CHANGE_SIGMAS: f64 = 2.0;
 /// Standard deviation of the size of a step before it is measured: ten percent.
 const SIZE_SIGMA: f64 = 0.1;

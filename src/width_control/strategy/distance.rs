@@ -80,8 +80,8 @@ impl WidthStrategy for DistanceStrategy {
     }
 }
 
-/// Control by distance until its model is contradicted, then PI control for the rest of
-/// the bead.
+/// Control by distance, and PI control for the rest of a bead whose widths cannot be matched to the
+/// speeds at which it was laid.
 #[derive(Debug, Clone, PartialEq)]
 struct DistanceControl {
     by_distance: DistanceController,

@@ -40,7 +40,7 @@ const MAX_SQUARE: f64 = 20.0;
 const JUMP_FROM: f64 = 1.0;
 /// Smallest log likelihood ratio by the widths that see one jump that counts for another offset.
 /// Derived: waves that control answers give less, and would add up over many.
-const MIN_OF_A_JUMP: f64 = 4.0;
+const MIN_OF_A_JUMP: f64 = 6.0;
 /// The largest one. Derived: odds of one to eight thousand, after which a second jump is wanted.
 const MAX_OF_A_JUMP: f64 = 9.0;
 /// Log likelihood ratio from which on the stated offset is wrong. Derived: the largest and the smallest

@@ -7,6 +7,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use crate::core::Mm;
+use crate::numeric::average::mean;
 use crate::numeric::number::to_f64;
 use crate::width_control::speed_history::SpeedHistory;
 
@@ -49,6 +50,16 @@ pub struct MatchedWidth {
 }
 
 impl MatchedWidth {
+    /// The mean of some; `None` of none.
+    pub fn mean(all: &[Self]) -> Option<Self> {
+        let mean = |part: &dyn Fn(&Self) -> f64| mean(all.iter().map(part));
+        (!all.is_empty()).then(|| Self {
+            position_mm: mean(&|one| one.position_mm),
+            ln_width: mean(&|one| one.ln_width),
+            ln_speeds: std::array::from_fn(|at| mean(&|one| one.ln_speeds[at])),
+        })
+    }
+
     /// Mean of ln v over the gauge by the stated offset.
     pub fn ln_speed(&self) -> f64 {
         self.ln_speeds[STEPS]
@@ -96,6 +107,11 @@ pub struct View {
 }
 
 impl View {
+    /// Length of the gauge \[mm\].
+    pub const fn gauge_mm(self) -> f64 {
+        self.gauge_mm
+    }
+
     /// A gauge at an offset behind the nozzle that is right within a tolerance.
     pub fn new(offset: Mm, tolerance: Mm, gauge: Mm) -> Self {
         let (least, most) = (*TOLERANCES.start(), *TOLERANCES.end());

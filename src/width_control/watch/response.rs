@@ -6,19 +6,23 @@
 //! many times as much as it has done before, the width does not answer.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
 use super::plausible_offsets::{MatchedWidth, PlausibleOffsets, View};
 use crate::core::{Mm, MmPerS};
 use crate::numeric::rank;
+use crate::width_control::bead_noise::{BeadRoughness, WidthNoise};
 use crate::width_control::distance::WidthReading;
 use crate::width_control::speed_history::SpeedHistory;
 
-/// The weakest answer that is expected: the width falls by this fraction of a small change of the
-/// speed. Derived: the lower end of what control by distance learns of an exponent of 0.25, that of
-/// Shojaei Barjuei et al. 2022.
-const WEAKEST_EXPONENT: f64 = 0.175;
+/// The weakest answer that is expected, over the exponent of the cell: the width falls by the exponent
+/// times a small change of the speed. Derived: the lower end of what control by distance learns.
+const WEAKEST_ANSWER: f64 = 0.7;
+/// The largest exponent for this, and that of a cell that states none: a stated one is a guess as well.
+/// Derived: that of Shojaei Barjuei et al. 2022.
+const USUAL_EXPONENT: f64 = 0.25;
 /// Exponents with which the flow is derived from width and speed; the one that leaves the steadiest
 /// flow counts.
 const EXPONENTS: [f64; 5] = [0.15, 0.25, 0.4, 0.65, 1.0];
@@ -26,6 +30,12 @@ const EXPONENTS: [f64; 5] = [0.15, 0.25, 0.4, 0.65, 1.0];
 /// answer sooner, and takes a flow that cancels the speed for one more often. Set by the seeds 0 to 4999
 /// of `truebead lab control response`, between 5.0 with too many holds and 5.5 with too many misses.
 const MIN_CHANGES: f64 = 5.4;
+/// Length of bead on which the answer to a slow change is looked for, in lags: from ... Derived: a step
+/// of the flow lies within two means that overlap, over two lags.
+const SLOW_FROM: f64 = 3.0;
+/// ... to. Derived: control by distance follows another bead that is 2 % off target by 0.02 of ln v in
+/// a lag or more, and less than 0.10 need not be noticed.
+const SLOW_TO: f64 = 4.0;
 /// Length of bead that says how much the flow usually changes \[mm\] ...
 const USUAL_OVER_MM: f64 = 1000.0;
 /// ... and the least \[mm\].
@@ -50,17 +60,38 @@ pub struct NoResponse {
     pub speed_before: MmPerS,
 }
 
-/// The test.
+/// The test: over a lag between single widths, and for a speed that changes slowly over some lags between
+/// means.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseTest {
+    /// Path within which a change of the speed shows whole, wherever the camera may look \[mm\].
+    lag_mm: f64,
+    /// The weakest exponent that is expected.
+    weakest: f64,
+    /// Where the camera may look, by the bead up to a lag ago.
+    offsets: PlausibleOffsets,
+    /// Single widths.
+    fast: Stretch,
+    /// Means over a lag, one every half of it.
+    slow: Option<Stretch>,
+    /// The widths of the next mean.
+    next: Vec<MatchedWidth>,
+}
+
+/// The latest bead, over the length on which an answer is looked for.
+#[derive(Debug, Clone, PartialEq)]
+struct Stretch {
+    /// Path from one width to another that says how much the flow changes \[mm\].
+    lag_mm: f64,
+    /// The length without an answer that counts, in lags: the least, and the most that is kept.
+    least: f64,
+    most: f64,
     /// Variance of ln w of a width by the roughness.
     roughness: f64,
-    /// The latest widths, oldest first, over the path on which an answer is looked for.
+    /// Its widths, oldest first, and one before it.
     widths: VecDeque<MatchedWidth>,
-    /// Changes over that path, of all bead that says how much the flow usually changes.
+    /// The changes over a lag, of all bead that says how much the flow usually changes.
     changes: VecDeque<Change>,
-    /// Where the camera may look, by the bead before that path.
-    offsets: PlausibleOffsets,
 }
 
 /// Change of ln w and of ln v from one width to another.
@@ -71,20 +102,52 @@ struct Change {
     speed: f64,
 }
 
+/// What an answer looks like.
+#[derive(Debug, Clone, PartialEq)]
+struct Expected {
+    /// Standard deviation of ln w of a width by its measurement.
+    noise: f64,
+    target: Mm,
+    /// The weakest exponent.
+    weakest: f64,
+    /// Where the camera may look.
+    plausible: Range<usize>,
+}
+
+/// The widths at the two ends of bead whose width has stayed the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ends {
+    oldest: MatchedWidth,
+    newest: MatchedWidth,
+}
+
 impl ResponseTest {
-    /// Before the first width: where the camera looks, the variance of ln w by the roughness over its
-    /// gauge, and whether places at which the camera cannot look are excluded.
-    pub fn new(view: View, roughness: f64, excludes_offsets: bool) -> Self {
-        let (widths, changes) = (VecDeque::new(), VecDeque::new());
-        let offsets = PlausibleOffsets::new(view, roughness, excludes_offsets);
-        Self { roughness, widths, changes, offsets }
+    /// Before the first width: where the camera looks, the roughness of the bead, and its exponent,
+    /// where control has one. Control without one changes the speed in a ramp, which a drift of the flow
+    /// imitates: then no place is excluded at which the camera may look, and slow changes are not
+    /// compared.
+    pub fn new(view: View, roughness: BeadRoughness, exponent: Option<f64>) -> Self {
+        let over = |mm: f64| WidthNoise::new(roughness, mm).variance(f64::INFINITY);
+        let of_a_width = over(view.gauge_mm());
+        let offsets = PlausibleOffsets::new(view, of_a_width, exponent.is_some());
+        let lag_mm = offsets.span_mm();
+        let slow = || Stretch::new(lag_mm, SLOW_FROM, SLOW_TO, over(lag_mm));
+        Self {
+            lag_mm,
+            weakest: WEAKEST_ANSWER * exponent.unwrap_or(USUAL_EXPONENT).min(USUAL_EXPONENT),
+            offsets,
+            fast: Stretch::new(lag_mm, 1.0, 1.0, of_a_width),
+            slow: exponent.map(|_| slow()),
+            next: Vec::new(),
+        }
     }
 
     /// A new bead, or one that goes on elsewhere.
     pub fn begin_bead(&mut self) {
-        self.widths.clear();
-        self.changes.clear();
         self.offsets.clear();
+        self.fast.clear();
+        self.slow.iter_mut().for_each(Stretch::clear);
+        self.next.clear();
     }
 
     /// A width of the bead about a position, by the stated offset, and its target. Returns the change
@@ -100,82 +163,115 @@ impl ResponseTest {
             return None;
         }
         let newest = self.offsets.matched(speeds, position_mm, reading.width)?;
-        let before = self.widths.back().map(|last| last.position_mm);
+        let before = self.fast.widths.back().map(|last| last.position_mm);
         if before.is_some_and(|before| before >= newest.position_mm) {
             return None;
         }
-        self.widths.push_back(newest);
-        let mut oldest = None;
-        while self
-            .widths
-            .front()
-            .is_some_and(|one| newest.position_mm - one.position_mm > self.offsets.span_mm())
-        {
-            oldest = self.widths.pop_front();
+        let noise = reading.sigma / reading.width;
+        if let Some(before) = self.fast.add(newest) {
+            self.offsets.add(&before);
         }
-        let oldest = oldest?;
-        self.widths.push_front(oldest);
-        self.offsets.add(&oldest);
-        let found = self.compare(&oldest, &newest, reading, target).map(|over_mm| NoResponse {
+        let (weakest, plausible) = (self.weakest, self.offsets.plausible());
+        let expected = Expected { noise, target, weakest, plausible };
+        let fast = self.fast.unanswered(&expected);
+        let slow = self.mean_with(newest).and_then(|mean| {
+            let slow = self.slow.as_mut()?;
+            slow.add(mean);
+            slow.unanswered(&expected)
+        });
+        let Ends { oldest, newest } = fast.or(slow)?;
+        Some(NoResponse {
             speed_change: libm::expm1(newest.ln_speed() - oldest.ln_speed()),
             width_change: libm::expm1(newest.ln_width - oldest.ln_width),
-            over_mm,
+            over_mm: newest.position_mm - oldest.position_mm,
             speed_before: speeds.speed_of(oldest.ln_speed()),
-        });
-        self.remember(&oldest, &newest);
-        found
+        })
     }
 
-    fn remember(&mut self, oldest: &MatchedWidth, newest: &MatchedWidth) {
-        let position_mm = newest.position_mm;
-        let width = newest.ln_width - oldest.ln_width;
-        let speed = newest.ln_speed() - oldest.ln_speed();
-        self.changes.push_back(Change { position_mm, width, speed });
-        while self.changes.front().is_some_and(|one| position_mm - one.position_mm > USUAL_OVER_MM)
-        {
+    /// Adds a width to those of the next mean; returns the mean, once they are of a lag.
+    fn mean_with(&mut self, newest: MatchedWidth) -> Option<MatchedWidth> {
+        self.next.push(newest);
+        let first = self.next.first()?;
+        if newest.position_mm - first.position_mm < self.lag_mm {
+            return None;
+        }
+        let mean = MatchedWidth::mean(&self.next);
+        let middle_mm = newest.position_mm - 0.5 * self.lag_mm;
+        self.next.retain(|one| one.position_mm > middle_mm);
+        mean
+    }
+}
+
+impl Stretch {
+    fn new(lag_mm: f64, least: f64, most: f64, roughness: f64) -> Self {
+        let (widths, changes) = (VecDeque::new(), VecDeque::new());
+        Self { lag_mm, least, most, roughness, widths, changes }
+    }
+
+    fn clear(&mut self) {
+        self.widths.clear();
+        self.changes.clear();
+    }
+
+    /// Adds a width; returns the one a lag before.
+    fn add(&mut self, newest: MatchedWidth) -> Option<MatchedWidth> {
+        let since = |one: &MatchedWidth| newest.position_mm - one.position_mm;
+        let before = self.widths.iter().rev().find(|one| since(one) > self.lag_mm).copied();
+        self.widths.push_back(newest);
+        while self.widths.get(1).is_some_and(|second| since(second) > self.most * self.lag_mm) {
+            self.widths.pop_front();
+        }
+        let before = before?;
+        self.changes.push_back(Change {
+            position_mm: newest.position_mm,
+            width: newest.ln_width - before.ln_width,
+            speed: newest.ln_speed() - before.ln_speed(),
+        });
+        let is_old = |one: &Change| {
+            newest.position_mm - one.position_mm > USUAL_OVER_MM + self.most * self.lag_mm
+        };
+        while self.changes.front().is_some_and(is_old) {
             self.changes.pop_front();
         }
+        Some(before)
     }
 
-    /// By how much the flow usually changes: the median, with the exponent for which it is least;
-    /// `None` where too little bead is known.
-    fn usual_change(&self) -> Option<f64> {
-        let (first, last) = (self.changes.front()?, self.changes.back()?);
+    /// By how much the flow usually changes over a lag, by the bead before a position: the median,
+    /// with the exponent for which it is least; `None` where too little bead is known.
+    fn usual_change(&self, before_mm: f64) -> Option<f64> {
+        let changes = self.changes.iter().take_while(|one| one.position_mm <= before_mm);
+        let (first, last) = (self.changes.front()?, changes.clone().last()?);
         if last.position_mm - first.position_mm < MIN_USUAL_OVER_MM {
             return None;
         }
         let median = |exponent: f64| {
             let size = |change: &Change| (change.width + exponent * change.speed).abs();
-            rank::mean_median(&mut self.changes.iter().map(size).collect::<Vec<f64>>())
+            rank::mean_median(&mut changes.clone().map(size).collect::<Vec<f64>>())
         };
         EXPONENTS.into_iter().filter_map(median).min_by(f64::total_cmp)
     }
 
-    /// The path on which the speed has changed and the width has not \[mm\], where the flow has no
-    /// reason for it.
-    fn compare(
-        &self,
-        oldest: &MatchedWidth,
-        newest: &MatchedWidth,
-        reading: WidthReading,
-        target: Mm,
-    ) -> Option<f64> {
-        let plausible = self.offsets.plausible();
-        let flow = newest.flow_change(oldest, WEAKEST_EXPONENT, plausible);
-        let measurement = reading.sigma / reading.width;
-        let sigma = (self.roughness + measurement * measurement).sqrt();
-        let widths = self.widths.iter().map(|one| one.ln_width);
-        let (least, most) = widths
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), one| {
-                (least.min(one), most.max(one))
-            });
-        let same = MAX_RANGE_SIGMAS * sigma;
+    /// The bead on which the speed has changed and the width has not, where the flow has no reason
+    /// for it.
+    fn unanswered(&self, expected: &Expected) -> Option<Ends> {
+        let Expected { noise, target, weakest, plausible } = expected;
+        let same = MAX_RANGE_SIGMAS * (self.roughness + noise * noise).sqrt();
+        let newest = self.widths.back()?;
+        let (mut least, mut most) = (newest.ln_width, newest.ln_width);
+        let is_same = |one: &&MatchedWidth| {
+            (least, most) = (least.min(one.ln_width), most.max(one.ln_width));
+            most - least <= same
+        };
+        let oldest = self.widths.iter().rev().take_while(is_same).last()?;
+        let lags = (newest.position_mm - oldest.position_mm) / self.lag_mm;
         let is_off = (newest.ln_width - libm::log(target.get())).abs() > MIN_ERROR;
-        if most - least > same || flow < same || !is_off {
+        let flow = newest.flow_change(oldest, *weakest, plausible.clone());
+        if lags <= self.least || flow < same || !is_off {
             return None;
         }
-        (flow > MIN_CHANGES * self.usual_change()?)
-            .then_some(newest.position_mm - oldest.position_mm)
+        // What changes at random grows with the root of the path.
+        let usual = self.usual_change(oldest.position_mm)? * lags.sqrt();
+        (flow > MIN_CHANGES * usual).then_some(Ends { oldest: *oldest, newest: *newest })
     }
 }
 
@@ -209,6 +305,10 @@ mod tests {
         begins_at: f64,
         /// Speed after the step \[mm/s\].
         ends_at: f64,
+        /// Length of bead over which the speed changes to that one \[mm\].
+        ramp_mm: f64,
+        /// Whether control has an exponent.
+        is_modelled: bool,
     }
 
     /// Path of the nozzle at the first step \[mm\].
@@ -224,15 +324,16 @@ mod tests {
             offset_sigma: Mm::constant(seen.offset_sigma_mm),
             gauge: Mm::constant(GAUGE_MM),
             reference_speed: MmPerS::constant(100.0),
-            exponent: Some(0.25),
+            exponent: seen.is_modelled.then_some(0.25),
             roughness: BeadRoughness { ratio: 0.0025, length_mm: 5.0 },
         });
         let (mut path, mut at) = (0.0, 0.0);
         while path < STEP_MM + 600.0 {
+            let ramp = |mm: f64| ((mm - STEP_MM) / seen.ramp_mm).clamp(0.0, 1.0);
             let speed = match path {
                 ..FIRST_MM => seen.begins_at,
                 ..STEP_MM => 80.0,
-                _ => seen.ends_at,
+                _ => 80.0 * (seen.ends_at / 80.0).powf(ramp(path)),
             };
             (path, at) = (path + speed * FRAME_S, at + FRAME_S);
             test.reported(&BeadReport {
@@ -243,7 +344,9 @@ mod tests {
             });
             let middle = path - OFFSET_MM - seen.farther_mm;
             let before = |mm: f64| ((mm - middle) / GAUGE_MM + 0.5).clamp(0.0, 1.0);
-            let ln_speed = (1.0 - before(STEP_MM)) * (seen.ends_at / 80.0).ln();
+            let changed =
+                if seen.ramp_mm > GAUGE_MM { ramp(middle) } else { 1.0 - before(STEP_MM) };
+            let ln_speed = changed * (seen.ends_at / 80.0).ln();
             let begin = 0.25 * before(FIRST_MM) * (seen.begins_at / 80.0).ln();
             let flow = seen.wave * (std::f64::consts::TAU * middle / 100.0).sin();
             let [rough, _] = hash::normal_pair(hash::mix(&[5, (middle / 8.0).floor().to_bits()]));
@@ -254,9 +357,9 @@ mod tests {
             };
             let found = test.measured(Mm::constant(path), reading, Mm::constant(42.0)).no_response;
             if let Some(found) = found {
-                assert!((0.15..0.26).contains(&found.speed_change), "{found:?}");
+                assert!((0.05..0.26).contains(&found.speed_change), "{found:?}");
                 assert!(found.width_change.abs() < 0.01, "{found:?}");
-                assert!((found.speed_before.get() - 80.0).abs() < 0.1, "{found:?}");
+                assert!((found.speed_before.get() - 80.0).abs() < 1.0, "{found:?}");
                 return Some(path - STEP_MM);
             }
         }
@@ -271,6 +374,8 @@ mod tests {
         ratio: 1.05,
         begins_at: 80.0,
         ends_at: 100.0,
+        ramp_mm: 1e-3,
+        is_modelled: true,
     };
 
     #[test]
@@ -310,6 +415,18 @@ mod tests {
                     assert_eq!(noticed_after(seen), None, "{seen:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_slow_change_without_an_answer_is_noticed_where_control_has_a_model() {
+        let slow = Seen { exponent: 0.0, ratio: 1.025, ends_at: 95.0, ramp_mm: 500.0, ..ANSWERS };
+        let after = noticed_after(slow).unwrap();
+        // ln v has changed by 0.10 after three fifths of the ramp.
+        assert!(after <= 300.0 + OFFSET_MM + 2.0 * GAUGE_MM, "{after}");
+        assert_eq!(noticed_after(Seen { is_modelled: false, ..slow }), None);
+        for exponent in [0.175, 0.25, 0.5] {
+            assert_eq!(noticed_after(Seen { exponent, ..slow }), None, "{exponent}");
         }
     }
 
