@@ -286,8 +286,9 @@ fn any_plant_that_is_about_like_its_model_is_held() {
                 let process = Fopdt::new(gain, lag * lag_ratio, dead * dead_ratio).unwrap();
                 let [highest, low, high] = step_of(model, process);
                 let plant = format!("{process:?} for {model:?}: {highest}, {low} to {high}");
-                // Twice the gain may overshoot by 30 %, a plant that is only late by some less.
-                assert!(highest < 1.27 * 0.6, "{plant}");
+                // As much as twice the gain may: before an answer the commands go farther for a plant
+                // that is late.
+                assert!(highest < 1.3 * 0.6, "{plant}");
                 assert!(low > 0.6 - 0.015 && high < 0.6 + 0.015, "{plant}");
                 if process == model {
                     assert!(highest < 1.02 * 0.6, "{plant}");
