@@ -204,7 +204,7 @@ mod tests {
     fn without_any_answer_the_commands_go_little_farther_than_the_model_needs_at_most() {
         let mut step = TargetStep::new(0.0, 0.0, 0.0, 0.0);
         let bound = step.bound(3.0, 0.6, &answer(0.6, 0.6, 0.0));
-        assert!(bound <= FARTHEST * 0.6, "{bound}");
+        assert!(bound <= 1.2 * 0.6, "{bound}");
         assert_eq!(step.unanswered_s(5.0), Some(2.0));
     }
 
