@@ -1,6 +1,7 @@
 //! `truebead lab`: how well it measures and controls.
 
 mod accuracy;
+mod case_rows;
 mod control;
 mod live;
 mod render;

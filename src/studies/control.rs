@@ -16,51 +16,45 @@ mod response;
 mod steps;
 pub mod table;
 
+use std::ops::Range;
+
 use crate::io::progress::Progress;
 use crate::studies::error::ReproduceError;
 
 use plant::LoopCell;
 use table::CaseRow;
 
-/// A group of cases.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr, strum::VariantArray)]
+/// A group of cases. What is said of each is what a person reads who asks for help.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, strum::IntoStaticStr, strum::VariantArray, strum::EnumMessage,
+)]
 #[strum(serialize_all = "snake_case")]
 pub enum Case {
-    /// From 38.6 to 42 mm, and steps of the flow.
+    /// From 38.6 to 42 mm; the flow steps by 8 %
     Steps,
-    /// A pump that pulsates, and one that does not.
+    /// The flow pulsates, or does not
     Pulsation,
-    /// Wrong offset and exponent, drift and waves.
+    /// Offset, exponent, drift and waves are drawn at random
     Mismatch,
-    /// Another bead in view, and beads on which nothing is wrong.
+    /// Another bead comes into view; or nothing is wrong
     Response,
-    /// An offset that is a fifth off.
+    /// The camera's offset is a fifth off
     Offset,
-    /// A camera whose frames are stamped late, its offset and latency found from steps of the speed.
+    /// Frames are stamped late
     Latency,
-    /// Cameras, robots, extruders and disks that fail, live on a virtual clock.
+    /// Cameras, robots, extruders and disks fail
     Faults,
-    /// The pressure loop with a plant and a sensor that are not its model's.
+    /// Plant, screw or sensor differ from the pressure loop's model
     Pressure,
 }
 
 impl Case {
-    /// What happens, in a line.
-    pub const fn about(self) -> &'static str {
-        match self {
-            Self::Steps => "from 38.6 to 42 mm; the flow steps by 8 %",
-            Self::Pulsation => "the flow pulsates, or does not",
-            Self::Mismatch => "offset, exponent, drift and waves are drawn at random",
-            Self::Response => "another bead comes into view; or nothing is wrong",
-            Self::Offset => "the camera's offset is a fifth off",
-            Self::Latency => "frames are stamped late",
-            Self::Faults => "cameras, robots, extruders and disks fail",
-            Self::Pressure => "plant, screw or sensor differ from the pressure loop's model",
-        }
-    }
-
-    /// Lays its beads with each seed from 0 on.
-    pub fn rows(self, seeds: u64, progress: &mut Progress) -> Result<Vec<CaseRow>, ReproduceError> {
+    /// Lays its beads with each seed.
+    pub fn rows(
+        self,
+        seeds: &Range<u64>,
+        progress: &mut Progress,
+    ) -> Result<Vec<CaseRow>, ReproduceError> {
         let of_cell = match self {
             Self::Steps => steps::rows,
             Self::Pulsation => pulsation::rows,
@@ -111,7 +105,7 @@ mod tests {
     #[test]
     fn the_bead_has_its_width_soon_after_the_start_and_after_a_step_of_the_flow() {
         for cell in LoopCell::ALL {
-            let rows = steps::rows(cell, 6).unwrap();
+            let rows = steps::rows(cell, &(0..6)).unwrap();
             assert_eq!(rows.len(), 8);
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
             assert!(missed.is_empty(), "{missed:#?}");
@@ -121,7 +115,7 @@ mod tests {
     #[test]
     fn a_width_that_does_not_answer_is_noticed_and_no_other_bead_is_held() {
         for cell in LoopCell::ALL.into_iter().filter(|cell| cell.is_fast()) {
-            let rows = response::rows(cell, 12).unwrap();
+            let rows = response::rows(cell, &(0..12)).unwrap();
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
             assert!(missed.is_empty(), "{missed:#?}");
         }
@@ -130,7 +124,7 @@ mod tests {
     #[test]
     fn an_offset_that_is_a_fifth_wrong_is_noticed() {
         for cell in LoopCell::ALL.into_iter().filter(|cell| cell.is_fast()) {
-            let rows = offset::rows(cell, 20).unwrap();
+            let rows = offset::rows(cell, &(0..20)).unwrap();
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !may_be_chance(row)).collect();
             assert!(missed.is_empty(), "{missed:#?}");
         }
@@ -139,19 +133,19 @@ mod tests {
     #[test]
     fn whatever_fails_control_holds_in_time_and_goes_on_or_stops_the_robot() {
         for cell in LoopCell::ALL {
-            let rows = faults::rows(cell, 8).unwrap();
+            let rows = faults::rows(cell, &(0..8)).unwrap();
             assert!(rows.len() > 40, "{}", rows.len());
             let missed: Vec<&CaseRow> = rows.iter().filter(|row| !may_be_chance(row)).collect();
             assert!(missed.is_empty(), "{missed:#?}");
         }
-        let rows = faults::extruder_rows(8).unwrap();
+        let rows = faults::extruder_rows(&(0..8)).unwrap();
         assert!(rows.iter().all(CaseRow::is_met), "{rows:#?}");
     }
 
     #[test]
     fn a_pressure_is_held_as_well_as_by_pi_control_whatever_of_the_model_is_wrong() {
         let mut progress = Progress::new("simulating", "cases", None, true);
-        let rows = pressure::rows(4, &mut progress).unwrap();
+        let rows = pressure::rows(&(0..4), &mut progress).unwrap();
         assert!(rows.len() > 300, "{}", rows.len());
         let missed: Vec<&CaseRow> = rows.iter().filter(|row| !row.is_met()).collect();
         // Met with 30 seeds.

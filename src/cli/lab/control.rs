@@ -3,16 +3,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use strum::VariantArray;
+use strum::{EnumMessage, VariantArray};
 
+use super::case_rows;
 use crate::cli::print::Verbosity;
 use crate::io::progress::Progress;
 use crate::rows::output;
 use crate::studies::control::Case;
-use crate::studies::control::table::{CaseRow, plain};
 
 /// Controls simulated beads and pressures that differ from the controller's model, with machines that
 /// fail.
@@ -21,7 +20,7 @@ use crate::studies::control::table::{CaseRow, plain};
 Example:
   truebead lab control steps --out control
 
-Prints a table and leaves control.json. Every figure is that of the bead's true width, of the true
+Prints a table and leaves control.json, which is written anew after each case. Every figure is that of the bead's true width, of the true
 pressure at the nozzle, or of when control held and the robot stopped.
 Status 1 if a figure is above what is required.")]
 pub struct ControlArgs {
@@ -35,6 +34,10 @@ pub struct ControlArgs {
     #[arg(long, value_name = "N", default_value_t = 100,
         value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
+    /// The first of them: parameters that were chosen with some seeds are judged with others
+    #[arg(long, value_name = "N", default_value_t = 0,
+        value_parser = clap::value_parser!(u64).range(..=1_000_000))]
+    first_seed: u64,
 }
 
 impl ValueEnum for Case {
@@ -43,7 +46,8 @@ impl ValueEnum for Case {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(<&'static str>::from(*self)).help(self.about()))
+        let value = PossibleValue::new(<&'static str>::from(*self));
+        Some(value.help(self.get_documentation().unwrap_or_default()))
     }
 }
 
@@ -54,14 +58,12 @@ pub fn run(args: &ControlArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     let total: usize = cases.iter().map(|case| case.steps()).sum();
     let total = u64::try_from(total).ok();
     let mut progress = Progress::new("simulating", "cases", total, voice.quiet);
+    let seeds = args.first_seed..args.first_seed + args.seeds;
     let mut rows = Vec::new();
     for case in cases {
-        rows.extend(case.rows(args.seeds, &mut progress)?);
+        rows.extend(case.rows(&seeds, &mut progress)?);
+        case_rows::write(&rows, &args.out)?;
     }
     progress.finish();
-    let json = serde_json::to_vec_pretty(&rows).context("control.json")?;
-    output::write_whole(&args.out, "control.json", &json)?;
-    say!("{}", plain(&rows));
-    let missed = rows.iter().any(|row: &CaseRow| !row.is_met());
-    Ok(if missed { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    Ok(case_rows::print(&rows, &args.out))
 }

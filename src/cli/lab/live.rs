@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::Args;
 
+use super::case_rows;
 use crate::assembly::LoadedCell;
 use crate::cell::file::Purpose;
 use crate::cli::live_cell::{Folders, Until, live};
@@ -20,7 +21,6 @@ use crate::simulators::robot::{RobotOptions, RobotSim};
 use crate::studies::control::bead_figures::{BeadFigures, late_rows, rows};
 use crate::studies::control::live::{BEAD_MM, cell_text, laid};
 use crate::studies::control::plant::LoopCell;
-use crate::studies::control::table::{CaseRow, plain};
 
 /// Duration of a run \[s\]. Derived: the bead at the 77 mm/s for 42 mm of Shojaei Barjuei et al. 2022,
 /// table 2, of which the last 600 mm are quicker.
@@ -63,11 +63,8 @@ pub fn run(args: &LiveArgs, voice: Verbosity) -> anyhow::Result<ExitCode> {
     }
     all.extend(late_rows("all cells", "live", &every));
     progress.finish();
-    let json = serde_json::to_vec_pretty(&all).context("control.json")?;
-    output::write_whole(&args.out, "control.json", &json)?;
-    say!("{}", plain(&all));
-    let missed = all.iter().any(|row: &CaseRow| !row.is_met());
-    Ok(if missed { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    case_rows::write(&all, &args.out)?;
+    Ok(case_rows::print(&all, &args.out))
 }
 
 /// Lays one bead with the program's own live run.

@@ -1,6 +1,7 @@
 //! Live runs on a virtual clock in which something fails: whether control holds in time, and whether
 //! it goes on or stops the robot.
 
+use std::ops::Range;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -64,18 +65,19 @@ struct FaultCase {
 }
 
 /// The rows of a cell.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = sound_rows(cell, seeds)?;
     for case in cases(cell)? {
         let judged = |seed| Judged::of(cell, &case, seed);
-        let runs: Vec<Judged> = (0..seeds).into_par_iter().map(judged).collect::<Result<_, _>>()?;
+        let runs: Vec<Judged> =
+            seeds.clone().into_par_iter().map(judged).collect::<Result<_, _>>()?;
         rows.extend(case.rows(cell, &runs));
     }
     Ok(rows)
 }
 
 /// Runs in which nothing fails.
-fn sound_rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+fn sound_rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let plan = Plan::new(cell, Control::Distance)?.long(BEAD_MM);
     let mut plan = plan.laid(Execution::Rehearsed);
     let flow = &mut plan.cell.simulation.flow;
@@ -140,7 +142,7 @@ fn cases(cell: LoopCell) -> Result<Vec<FaultCase>, ReproduceError> {
 }
 
 /// The rows of a cell whose extruder is commanded.
-pub fn extruder_rows(seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn extruder_rows(seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let text = include_str!("../../../cells/extruder-pressure.toml").to_owned();
     let loaded = LoadedCell::from_text(Path::new("extruder-pressure.toml"), text, Purpose::Run)?;
     let run = loaded.cell.run.as_ref().ok_or(ReproduceError::NoRun)?;
@@ -174,7 +176,7 @@ pub fn extruder_rows(seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
             Ok(Judged::judge(&run.run()?, &fault, &case))
         };
         let runs: Vec<Judged> =
-            (0..seeds).into_par_iter().map(judged).collect::<Result<_, ReproduceError>>()?;
+            seeds.clone().into_par_iter().map(judged).collect::<Result<_, ReproduceError>>()?;
         rows.extend(case.rows("extruder-pressure.toml", &runs));
     }
     Ok(rows)

@@ -2,6 +2,7 @@
 //! from steps of the speed, as `truebead camera offset --latency` finds them, and a bead is laid
 //! with what was found.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -35,11 +36,11 @@ const AFTER_STEP_MM: f64 = 600.0;
 const SEARCHED_RATIO: f64 = 3.0;
 
 /// The rows of a cell.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut plan = Plan::new(cell, Control::Distance)?;
     plan.cell.simulation.stamp_delay = DELAY;
     let beads: Result<Vec<BeadFigures>, ReproduceError> =
-        (0..seeds).into_par_iter().map(|seed| bead(cell, &plan, seed)).collect();
+        seeds.clone().into_par_iter().map(|seed| bead(cell, &plan, seed)).collect();
     let beads = beads?;
     let mut rows = bead_figures::rows(cell, CIRCUMSTANCE, &beads)?;
     let beads: Vec<(LoopCell, BeadFigures)> = beads.into_iter().map(|one| (cell, one)).collect();

@@ -1,5 +1,7 @@
 //! A controller whose offset and exponent are wrong, with drift and waves of the flow.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::plant::{Control, Draw, Execution, LoopCell, Plan, TARGET_MM};
@@ -19,7 +21,7 @@ const WAVELENGTHS_MM: [f64; 12] =
 const AMPLITUDE: f64 = 0.01;
 
 /// The rows of a cell.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
     for execution in Execution::ALL {
         rows.extend(rows_laid(cell, seeds, execution)?);
@@ -29,11 +31,12 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
 
 fn rows_laid(
     cell: LoopCell,
-    seeds: u64,
+    seeds: &Range<u64>,
     execution: Execution,
 ) -> Result<Vec<CaseRow>, ReproduceError> {
     let drawn = |control| {
-        (0..seeds)
+        seeds
+            .clone()
             .into_par_iter()
             .map(|seed| Ok(errors(&drawn_plan(cell, control, seed)?.laid(execution).lay(seed)?)))
             .collect::<Result<Vec<f64>, ReproduceError>>()
@@ -107,7 +110,7 @@ mod tests {
                 let bead = &mut plan.cell.simulation.bead;
                 (bead.exponent, bead.slow_exponent) = (0.45, 0.5);
                 plan.assumed_offset = offset;
-                let found = plan.each(10, errors).unwrap();
+                let found = plan.each(&(0..10), errors).unwrap();
                 assert!(found.iter().all(|rms_mm| *rms_mm < 0.5), "{cell:?}, {offset}: {found:?}");
             }
         }

@@ -1,5 +1,7 @@
 //! Whether it is noticed that the camera's offset is wrong.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::laid_length::LaidLength;
@@ -24,7 +26,7 @@ const CHANGE: f64 = 0.10;
 const CHANGES: usize = 2;
 
 /// The rows of a cell. Under PI control the offset is not tested.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
     for execution in Execution::ALL {
         rows.extend(rows_laid(cell, seeds, execution)?);
@@ -34,10 +36,11 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
 
 fn rows_laid(
     cell: LoopCell,
-    seeds: u64,
+    seeds: &Range<u64>,
     execution: Execution,
 ) -> Result<[CaseRow; 4], ReproduceError> {
-    let all: Vec<Warned> = (0..seeds)
+    let all: Vec<Warned> = seeds
+        .clone()
         .into_par_iter()
         .map(|seed| Warned::on(&plan(cell, seed)?.laid(execution), seed))
         .collect::<Result<_, ReproduceError>>()?;

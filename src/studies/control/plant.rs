@@ -1,5 +1,6 @@
 //! The four cells of the study, and one bead in one of them.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -238,10 +239,10 @@ impl Plan {
     /// A number for each seed from 0 on, in parallel.
     pub fn each<T: Send>(
         &self,
-        seeds: u64,
+        seeds: &Range<u64>,
         of: impl Fn(&LayerTrial) -> T + Send + Sync,
     ) -> Result<Vec<T>, ReproduceError> {
-        (0..seeds).into_par_iter().map(|seed| Ok(of(&self.lay(seed)?))).collect()
+        seeds.clone().into_par_iter().map(|seed| Ok(of(&self.lay(seed)?))).collect()
     }
 }
 

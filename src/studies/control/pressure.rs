@@ -6,6 +6,7 @@ mod machine;
 mod response;
 
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -261,7 +262,7 @@ fn range(pressures: &[f64]) -> f64 {
 }
 
 /// The rows of the study.
-pub fn rows(seeds: u64, progress: &mut Progress) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(seeds: &Range<u64>, progress: &mut Progress) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = nominal_rows()?;
     for execution in Execution::ALL {
         for case in cases() {
@@ -310,9 +311,13 @@ impl PressureCase {
     }
 
     /// All of its rows; of two wrong parameters the one that is nearest to what is required.
-    fn rows(&self, execution: Execution, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+    fn rows(
+        &self,
+        execution: Execution,
+        seeds: &Range<u64>,
+    ) -> Result<Vec<CaseRow>, ReproduceError> {
         let each = |case: &Self, tried| -> Result<Vec<Figures>, ReproduceError> {
-            (0..seeds).into_par_iter().map(|seed| case.run(execution, tried, seed)).collect()
+            seeds.clone().into_par_iter().map(|seed| case.run(execution, tried, seed)).collect()
         };
         let free = Self { is_limited: false, ..self.clone() };
         let (ours, theirs) =

@@ -1,6 +1,7 @@
 //! A pump that pulsates.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::plant::{Control, Execution, LoopCell, Plan};
@@ -32,7 +33,7 @@ const SPEED_SPACING_MM: f64 = 7.7;
 const MIN_SEEN: f64 = 0.4;
 
 /// The rows of a cell.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
     for execution in Execution::ALL {
         rows.extend(steady_rows(cell, seeds, execution)?);
@@ -44,7 +45,7 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
 /// A pump that pulsates. Beads without roughness are simulated only: they say what could be reached.
 fn pulsating_rows(
     cell: LoopCell,
-    seeds: u64,
+    seeds: &Range<u64>,
     execution: Execution,
 ) -> Result<Vec<CaseRow>, ReproduceError> {
     let row = |case: &str, quantity, ratios: &[f64], fraction, required| {
@@ -85,7 +86,7 @@ fn pulsating_rows(
 /// A pump that does not pulsate: what the part that cancels costs.
 fn steady_rows(
     cell: LoopCell,
-    seeds: u64,
+    seeds: &Range<u64>,
     execution: Execution,
 ) -> Result<[CaseRow; 2], ReproduceError> {
     let plan = Plan::new(cell, Control::Distance)?.long(LENGTH_MM).laid(execution);
@@ -126,7 +127,7 @@ fn speed_change(with: &[BeadPoint], without: &[BeadPoint]) -> f64 {
     rms(changes)
 }
 
-fn ratios_of(ours: &Plan, open: &Plan, seeds: u64) -> Result<Vec<f64>, ReproduceError> {
+fn ratios_of(ours: &Plan, open: &Plan, seeds: &Range<u64>) -> Result<Vec<f64>, ReproduceError> {
     let lay = |plan: &Plan| plan.each(seeds, |trial| trial.rms_error(JUDGED_FROM_MM));
     let (ours, open) = (lay(ours)?, lay(open)?);
     Ok(ours.iter().zip(&open).map(|(ours, open)| ratio(*ours, *open)).collect())

@@ -1,6 +1,8 @@
 //! Whether it is noticed that the width does not answer the speed, and whether that is said of beads
 //! on which it does.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::laid_length::LaidLength;
@@ -64,7 +66,7 @@ impl Trials {
 }
 
 /// The rows of a cell.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
     for trials in Trials::ALL {
         let case = trials.case("another bead in view");
@@ -72,7 +74,8 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
         rows.extend(fault_rows(cell, &case, &faulty)?);
         let case = trials.case("no fault");
         let sound = observe(seeds, |seed| Ok(disturbed(trials.plan(cell)?, seed)))?;
-        let alarms: Vec<CaseRow> = (0..seeds)
+        let alarms: Vec<CaseRow> = seeds
+            .clone()
             .zip(&sound)
             .filter_map(|(seed, one)| alarm_row(cell, &format!("{case}, seed {seed}"), one))
             .collect();
@@ -107,10 +110,10 @@ fn fault_rows(
 }
 
 fn observe(
-    seeds: u64,
+    seeds: &Range<u64>,
     plan: impl Fn(u64) -> Result<Plan, ReproduceError> + Send + Sync,
 ) -> Result<Vec<Noticed>, ReproduceError> {
-    (0..seeds).into_par_iter().map(|seed| Noticed::on(&plan(seed)?, seed)).collect()
+    seeds.clone().into_par_iter().map(|seed| Noticed::on(&plan(seed)?, seed)).collect()
 }
 
 /// From somewhere on the camera sees another bead, 1 to 10 mm off target.

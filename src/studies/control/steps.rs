@@ -1,5 +1,7 @@
 //! From the width of the start speed to the target, and steps of the flow.
 
+use std::ops::Range;
+
 use super::plant::{BAND_MM, Control, Execution, LoopCell, Plan};
 use super::table::{CaseRow, Quantity, quantile};
 use crate::numeric::average::mean;
@@ -22,7 +24,7 @@ const AFTER_LOW_MM: f64 = 1400.0;
 const JUDGED_AFTER_MM: f64 = 500.0;
 
 /// The rows of a cell.
-pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(cell: LoopCell, seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let plan = Plan::new(cell, Control::Distance)?;
     let mut rows = start_rows(cell, &plan, seeds)?;
     rows.extend(more_flow_rows(cell, &plan, seeds)?);
@@ -32,7 +34,11 @@ pub fn rows(cell: LoopCell, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> 
     Ok(rows)
 }
 
-fn start_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+fn start_rows(
+    cell: LoopCell,
+    plan: &Plan,
+    seeds: &Range<u64>,
+) -> Result<Vec<CaseRow>, ReproduceError> {
     let mean_square = |trial: &LayerTrial| {
         trial.mean_square_over(cell.gauge_mm, trial.control_start_mm + JUDGED_AFTER_MM)
     };
@@ -54,7 +60,11 @@ fn start_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow>, R
     ])
 }
 
-fn more_flow_rows(cell: LoopCell, plan: &Plan, seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+fn more_flow_rows(
+    cell: LoopCell,
+    plan: &Plan,
+    seeds: &Range<u64>,
+) -> Result<Vec<CaseRow>, ReproduceError> {
     let at = plan.run.robot.start_length.get() + STEP_AFTER_MM;
     let mut plan = plan.clone();
     let flow = &mut plan.cell.simulation.flow;
@@ -81,7 +91,11 @@ pub const fn step_limits_mm(cell: LoopCell) -> (f64, f64) {
 }
 
 /// With too little flow the speed is at its limit; the bead is judged once the flow is back.
-fn less_flow_row(cell: LoopCell, plan: Plan, seeds: u64) -> Result<CaseRow, ReproduceError> {
+fn less_flow_row(
+    cell: LoopCell,
+    plan: Plan,
+    seeds: &Range<u64>,
+) -> Result<CaseRow, ReproduceError> {
     let at = plan.run.robot.start_length.get() + STEP_AFTER_MM;
     let until = at + LOW_FOR_MM;
     let mut plan = plan.long(until + AFTER_LOW_MM);

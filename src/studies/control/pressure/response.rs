@@ -1,6 +1,8 @@
 //! Whether it is noticed that the pressure does not answer its target, and whether that is said of
 //! pressures that do.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::live::LiveRun;
@@ -29,13 +31,14 @@ const TARGET_EVERY_S: f64 = 30.0;
 const STUCK_STREAM: u64 = 0x0073_7475_636b;
 
 /// The rows.
-pub fn rows(seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
+pub fn rows(seeds: &Range<u64>) -> Result<Vec<CaseRow>, ReproduceError> {
     let mut rows = Vec::new();
     for (stuck, name) in
         [(Stuck::Sensor, "sensor stuck"), (Stuck::Material, "screw conveys nothing")]
     {
         for execution in Execution::ALL {
-            let found: Result<Vec<Option<f64>>, ReproduceError> = (0..seeds)
+            let found: Result<Vec<Option<f64>>, ReproduceError> = seeds
+                .clone()
                 .into_par_iter()
                 .map(|seed| match execution {
                     Execution::Simulated => Ok(stuck_amid_a_bead(stuck, seed)?),
@@ -49,7 +52,7 @@ pub fn rows(seeds: u64) -> Result<Vec<CaseRow>, ReproduceError> {
         }
     }
     let alarms: Result<Vec<Option<f64>>, PressureError> =
-        (0..seeds).into_par_iter().map(alarm_s).collect();
+        seeds.clone().into_par_iter().map(alarm_s).collect();
     rows.extend(alarm_rows(&alarms?));
     Ok(rows)
 }
