@@ -14,7 +14,7 @@
 //! bead, from the width's own standard deviation, and from the drift of the flow that the cell
 //! states.
 
-mod exponent;
+mod estimate;
 mod flow_step;
 mod outlier_run;
 mod pulsating_bead;
@@ -32,7 +32,7 @@ use super::bead_noise::{BeadRoughness, WidthNoise};
 use super::speed_history::SpeedHistory;
 use crate::core::{Mm, MmPerS, Rpm, Span, Stamp};
 
-use exponent::Exponent;
+use estimate::Exponent;
 use flow_step::StepDetector;
 use outlier_run::OutlierRun;
 use pulsation::FlowPulsation;
@@ -181,7 +181,7 @@ impl DistanceController {
 
     /// Whether the model is known, so that a speed can be set.
     pub fn is_ready(&self) -> bool {
-        self.model.is_known()
+        self.model.estimate.is_known()
     }
 
     /// Why another controller must take over, if so.
@@ -231,7 +231,7 @@ impl DistanceController {
             length_mm: self.settings.gauge.get(),
             centre_tolerance_mm: OFFSET_SIGMAS * self.settings.offset_sigma.get(),
         };
-        MatchedWidth::new(&self.speed_history, gauge, reading, self.model.exponent())
+        MatchedWidth::new(&self.speed_history, gauge, reading, self.model.estimate.exponent())
     }
 
     fn take_sample(&mut self, mut sample: MatchedWidth) -> WidthUse {
@@ -251,7 +251,7 @@ impl DistanceController {
         }
         let ln_width = sample.observation.ln_width - self.pulsation.mean(&sample.laid_s);
         let mut steady = WidthObservation { ln_width, ..sample.observation };
-        if !self.steps.is_under_way() && self.model.is_known() {
+        if !self.steps.is_under_way() && self.model.estimate.is_known() {
             let innovation = self.model.innovation(&steady);
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
@@ -267,14 +267,14 @@ impl DistanceController {
 
     /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
     fn update(&mut self, position_mm: f64, observation: &WidthObservation) -> WidthUse {
-        if !self.model.is_known() {
+        if !self.model.estimate.is_known() {
             self.model.update(observation, false);
             return WidthUse::Taken;
         }
         let front = position_mm + 0.5 * self.settings.gauge.get();
         self.steps.push(front, *observation, self.model);
         if let Some(model) = self.steps.find() {
-            let predicted = |model: &WidthModel| observation.predicted(&model.estimate());
+            let predicted = |model: &WidthModel| observation.predicted(&model.estimate.state);
             let change = predicted(&model) - predicted(&self.model);
             self.pulsation.shift(change, change * change);
             self.model = model;
@@ -301,12 +301,12 @@ impl DistanceController {
 
     fn trace(&self, use_of_width: WidthUse) -> DistanceTrace {
         let mm = |value: f64| Mm::new(value).unwrap_or_default();
-        let level = self.model.ln_width().exp();
+        let level = self.model.estimate.ln_width().exp();
         DistanceTrace {
             use_of_width,
             level_mm: mm(level),
             level_sigma_mm: mm(level * self.model.sigma()),
-            exponent: self.model.exponent(),
+            exponent: self.model.estimate.exponent(),
             pulsation_s: self.pulsation.period_s(),
         }
     }

@@ -111,7 +111,7 @@ impl StepDetector {
     /// was under way, the model without it.
     pub fn find(&mut self) -> Option<WidthModel> {
         let base = self.records.front()?.before;
-        let widths = self.seen_widths(&base.estimate());
+        let widths = self.seen_widths(&base.estimate.state);
         let newest = widths.iter().rev().take(NEWEST_WIDTHS);
         if !self.is_under_way && newest.filter(|one| one.has_changed()).count() < MIN_WIDTHS {
             return None;
@@ -142,7 +142,7 @@ impl StepDetector {
     /// The newest model, with the state to which a correction leads, and its covariance.
     fn model_after(&self, by: &Correction, to_state: Matrix4x5<f64>) -> Option<WidthModel> {
         let (base, newest) = (self.records.front()?.before, self.records.back()?.before);
-        let state = base.estimate() + to_state * by.change;
+        let state = base.estimate.state + to_state * by.change;
         Some(newest.with_estimate(state, to_state * by.covariance * to_state.transpose()))
     }
 
@@ -318,7 +318,7 @@ struct NormalEquations {
 impl NormalEquations {
     /// Before the first width, from the model before it.
     fn new(base: &WidthModel) -> Option<Self> {
-        let of_model = base.covariance().try_inverse()?;
+        let of_model = base.estimate.covariance.try_inverse()?;
         let mut information = Matrix5::from_diagonal_element(1.0 / (SIZE_SIGMA * SIZE_SIGMA));
         information.fixed_view_mut::<4, 4>(0, 0).copy_from(&of_model);
         Some(Self { information, weighted: Vector5::zeros(), misfit: 0.0 })

@@ -9,10 +9,8 @@ use std::ops::Range;
 
 use nalgebra::{Complex, Matrix4, Vector2, Vector4};
 
-use super::exponent::Exponent;
-use super::width_model::{
-    MAX_SQUARED_INNOVATION, MIN_LN_SPEED_DIFFERENCE, WiderExponent, WidthObservation,
-};
+use super::estimate::{BeadEstimate, Exponent};
+use super::width_model::{MAX_SQUARED_INNOVATION, WidthObservation};
 
 /// Initial standard deviation of either component, as a fraction of the width: pulsations of
 /// a pump or a screw are a few percent.
@@ -20,8 +18,6 @@ const AMPLITUDE_SIGMA: f64 = 0.03;
 /// Random walk of either component: standard deviation over a radian. A larger value follows
 /// a pulsation that changes and takes more noise for one.
 const DRIFT_PER_ROOT_RAD: f64 = 2.8e-4;
-/// Initial standard deviation of the level.
-const LEVEL_SIGMA: f64 = 0.1;
 /// Shortest time over which a mean is computed. A shorter one counts as this: the value at a point.
 /// Derived: a millionth of the unit turns no phase by what a width shows.
 const MIN_LASTED: f64 = 1e-6;
@@ -55,9 +51,8 @@ pub struct PulsatingBead {
     /// Its drift over the stated one, as a variance.
     drift_ratio: f64,
     exponent: Exponent,
-    state: Vector4<f64>,
-    covariance: Matrix4<f64>,
-    known: bool,
+    /// What is known of it.
+    pub estimate: BeadEstimate,
 }
 
 impl PulsatingBead {
@@ -65,22 +60,20 @@ impl PulsatingBead {
     /// stated, as a variance.
     pub fn new(frequency: f64, drift_ratio: f64, exponent: Exponent) -> Self {
         let part = if frequency > 0.0 { AMPLITUDE_SIGMA * AMPLITUDE_SIGMA } else { 0.0 };
-        let spread = Vector4::new(LEVEL_SIGMA * LEVEL_SIGMA, exponent.variance(), part, part);
         Self {
             rad_per_unit: TAU * frequency,
             drift_ratio,
             exponent,
-            state: Vector4::new(0.0, exponent.prior, 0.0, 0.0),
-            covariance: Matrix4::from_diagonal(&spread),
-            known: false,
+            estimate: BeadEstimate::new(exponent, part),
         }
     }
 
     /// Before the first width of a bead: of all that was known, b remains.
     pub fn begin_again(&mut self) {
-        let before = *self;
+        let before = self.estimate;
         *self = Self::new(self.frequency(), self.drift_ratio, self.exponent);
-        (self.state.y, self.covariance.m22) = (before.state.y, before.covariance.m22);
+        self.estimate.state.y = before.state.y;
+        self.estimate.covariance.m22 = before.covariance.m22;
     }
 
     /// Whether it has a pulsation.
@@ -114,12 +107,8 @@ impl PulsatingBead {
         drift: f64,
     ) -> f64 {
         let WidthObservation { ln_width, ln_speed, variance, .. } = *observation;
-        if !self.known {
-            self.known = true;
-            self.state.x = ln_width + self.state.y * ln_speed;
-            let both = ln_speed * self.covariance.m22;
-            (self.covariance.m12, self.covariance.m21) = (both, both);
-            self.covariance.m11 += ln_speed * both;
+        if !self.estimate.is_known() {
+            self.estimate.begin(observation);
             return 0.0;
         }
         let harmonic = phases.mean();
@@ -128,54 +117,33 @@ impl PulsatingBead {
         let informs = Vector4::new(1.0, -self.informing_speed(ln_speed), harmonic.x, harmonic.y);
         let informed = covariance * informs;
         let total = informs.dot(&informed).max(0.0) + variance;
-        let by = ln_width - predicts.dot(&self.state);
+        let by = ln_width - predicts.dot(&self.estimate.state);
         let squared = by * by / total;
         let excess = squared / MAX_SQUARED_INNOVATION;
         let gain = informed / total;
-        self.state += gain * if excess > 1.0 { by / excess.sqrt() } else { by };
-        self.covariance = covariance - gain * informed.transpose();
-        self.exponent.keep_in_range(&mut self.state, &mut self.covariance);
+        self.estimate.state += gain * if excess > 1.0 { by / excess.sqrt() } else { by };
+        self.estimate.covariance = covariance - gain * informed.transpose();
+        self.estimate.keep_exponent_in_range();
         -0.5 * (squared.min(MAX_SQUARED_INNOVATION) + ln(total))
     }
 
     /// ln(v/v₀) by which a width informs b: near the speed at which the width is known best, that
     /// speed, which says nothing of b.
     fn informing_speed(&self, ln_speed: f64) -> f64 {
-        let known_best = self.covariance.m12 / self.covariance.m22;
-        if (ln_speed - known_best).abs() > MIN_LN_SPEED_DIFFERENCE { ln_speed } else { known_best }
+        let estimate = &self.estimate;
+        if estimate.shows_exponent(ln_speed) { ln_speed } else { estimate.best_known() }
     }
 
     /// The covariance after a time in which ln A has drifted by a variance.
     fn drifted(&self, passed: f64, drift: f64) -> Matrix4<f64> {
         let part = DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * self.rad_per_unit * passed;
         let drifts = Vector4::new(drift * self.drift_ratio, 0.0, part, part);
-        self.covariance + Matrix4::from_diagonal(&drifts)
-    }
-
-    /// ln A without the pulsation.
-    pub fn level(&self) -> f64 {
-        self.state.x
-    }
-
-    /// b.
-    pub fn exponent(&self) -> f64 {
-        self.state.y
-    }
-
-    /// ln A has changed, and is less certain by a variance.
-    pub fn shift(&mut self, by: f64, variance: f64) {
-        self.state.x += by;
-        self.covariance.m11 += variance;
-    }
-
-    /// b is less certain.
-    pub fn widen_exponent(&mut self, by: &WiderExponent) {
-        by.widen(&mut self.covariance);
+        self.estimate.covariance + Matrix4::from_diagonal(&drifts)
     }
 
     /// The pulsation of ln w in its mean over a time.
     pub fn mean(&self, over: &Range<f64>) -> f64 {
-        self.phases(over).mean().dot(&self.state.fixed_rows::<2>(2))
+        self.phases(over).mean().dot(&self.estimate.state.fixed_rows::<2>(2))
     }
 }
 
@@ -247,8 +215,8 @@ mod tests {
             let ln_width = 3.7 - exponent * ln_speed + 0.02 * (TAU * at / period).sin();
             add(&mut bead, at, &width(ln_width, ln_speed));
         }
-        assert!((bead.exponent() - exponent).abs() < 2e-3, "{bead:?}");
-        assert!((bead.level() - 3.7).abs() < 1e-3);
+        assert!((bead.estimate.exponent() - exponent).abs() < 2e-3, "{bead:?}");
+        assert!((bead.estimate.ln_width() - 3.7).abs() < 1e-3);
     }
 
     #[test]
@@ -259,8 +227,12 @@ mod tests {
             let at = 0.1 * f64::from(k);
             add(&mut bead, at, &width(3.7 + 0.001 * width_noise, 0.002 * speed_noise));
         }
-        assert!((bead.exponent() - EXPONENT.prior).abs() < 0.01, "{}", bead.exponent());
-        assert!(bead.covariance.m22 > 0.8 * EXPONENT.variance());
+        assert!(
+            (bead.estimate.exponent() - EXPONENT.prior).abs() < 0.01,
+            "{}",
+            bead.estimate.exponent()
+        );
+        assert!(bead.estimate.covariance.m22 > 0.8 * (0.4 * EXPONENT.prior).powi(2));
     }
 
     #[test]
@@ -297,7 +269,7 @@ mod tests {
         }
         let before = bead;
         bead.begin_again();
-        assert_eq!(bead.exponent(), before.exponent());
+        assert_eq!(bead.estimate.exponent(), before.estimate.exponent());
         assert_eq!(bead.mean(&(10.0..10.0)), 0.0);
     }
 }

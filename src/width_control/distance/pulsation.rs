@@ -4,10 +4,10 @@
 
 use std::ops::Range;
 
-use super::exponent::Exponent;
+use super::estimate::{Exponent, WiderExponent};
 use super::pulsating_bead::{Phases, PulsatingBead};
 use super::pulse_counter::{PulseCounter, ScrewPulses};
-use super::width_model::{ExpectedBead, WiderExponent, WidthObservation};
+use super::width_model::{ExpectedBead, WidthObservation};
 use crate::core::Rpm;
 
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
@@ -159,14 +159,14 @@ impl FlowPulsation {
     /// ln A of every hypothesis has changed, and is less certain by a variance.
     pub fn shift(&mut self, by: f64, variance: f64) {
         for one in &mut self.hypotheses {
-            one.bead.shift(by, variance);
+            one.bead.estimate.shift(by, variance);
         }
     }
 
     /// b of every hypothesis is less certain.
     pub fn widen_exponent(&mut self, by: &WiderExponent) {
         for one in &mut self.hypotheses {
-            one.bead.widen_exponent(by);
+            one.bead.estimate.widen_exponent(by);
         }
     }
 
@@ -176,8 +176,9 @@ impl FlowPulsation {
         let mut expected = steady;
         let Some(laid) = self.phases(laid_s) else { return steady };
         for Hypothesis { bead, weight, .. } in self.pulsating() {
-            expected.ln_width += weight * (bead.level() + bead.mean(&laid) - steady.ln_width);
-            expected.exponent += weight * (bead.exponent() - steady.exponent);
+            expected.ln_width +=
+                weight * (bead.estimate.ln_width() + bead.mean(&laid) - steady.ln_width);
+            expected.exponent += weight * (bead.estimate.exponent() - steady.exponent);
         }
         expected
     }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 use super::*;
-use crate::width_control::distance::exponent::Exponent;
+use crate::width_control::distance::estimate::Exponent;
 
 const GAUGE: f64 = 63.0;
 
@@ -21,7 +21,7 @@ fn width(ln_width: f64) -> WidthObservation {
 
 /// Change of the predicted ln w, at the speed of the widths.
 fn change(before: &WidthModel, after: &WidthModel) -> f64 {
-    let predicted = |model: &WidthModel| width(0.0).predicted(&model.estimate());
+    let predicted = |model: &WidthModel| width(0.0).predicted(&model.estimate.state);
     predicted(after) - predicted(before)
 }
 
@@ -36,7 +36,7 @@ struct Last {
 
 fn last(size: f64, until: f64, is_outlier: impl Fn(u32) -> bool) -> Last {
     let model = known();
-    let ln_width = width(0.0).predicted(&model.estimate());
+    let ln_width = width(0.0).predicted(&model.estimate.state);
     let mut detector = StepDetector::new(GAUGE);
     let mut last = None;
     let fronts = (0_u32..).map(|number| (number, 60.0 + 1.5 * f64::from(number)));
@@ -84,7 +84,7 @@ fn a_change_that_comes_faster_than_the_gauge_sees_a_step_is_followed() {
     let mut hardly_known = known();
     hardly_known.begin_bead();
     for (size, model) in [(0.2, known()), (-0.2, known()), (0.2, hardly_known)] {
-        let ln_width = width(0.0).predicted(&model.estimate());
+        let ln_width = width(0.0).predicted(&model.estimate.state);
         let mut detector = StepDetector::new(GAUGE);
         // Of another bead, the whole gauge comes into view at once.
         let after = (1..100).find_map(|number| {
@@ -102,7 +102,7 @@ fn a_change_that_comes_faster_than_the_gauge_sees_a_step_is_followed() {
 #[test]
 fn a_few_outliers_at_the_beginning_are_no_change() {
     let model = known();
-    let ln_width = width(0.0).predicted(&model.estimate());
+    let ln_width = width(0.0).predicted(&model.estimate.state);
     let mut detector = StepDetector::new(GAUGE);
     for number in 0..6_u32 {
         let more = if number == 0 { 0.0 } else { 0.2 };
@@ -120,7 +120,7 @@ fn widths_at_a_point_and_at_one_place_have_steps_too() {
         let step = if number >= 10 { 0.08 } else { 0.0 };
         // Two widths at every place.
         let front = 2.0 * f64::from(number / 2);
-        detector.push(front, width(width(0.0).predicted(&model.estimate()) + step), model);
+        detector.push(front, width(width(0.0).predicted(&model.estimate.state) + step), model);
         last = detector.find().or(last);
     }
     let step = change(&model, &last.unwrap());

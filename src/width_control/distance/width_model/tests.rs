@@ -9,7 +9,7 @@ fn observed(ln_width: f64, ln_speed: f64) -> WidthObservation {
 }
 
 fn predicted(model: &WidthModel, ln_speed: f64) -> f64 {
-    observed(0.0, ln_speed).predicted(&model.estimate())
+    observed(0.0, ln_speed).predicted(&model.estimate.state)
 }
 
 #[test]
@@ -20,8 +20,8 @@ fn two_speeds_identify_level_and_exponent() {
         let u = if k < 20 { 0.0 } else { -0.4 };
         model.update(&observed(3.7 - 0.31 * u, u), true);
     }
-    assert!((model.exponent() - 0.31).abs() < 1e-3, "{model:?}");
-    assert!((model.ln_width() - 3.7).abs() < 1e-3);
+    assert!((model.estimate.exponent() - 0.31).abs() < 1e-3, "{model:?}");
+    assert!((model.estimate.ln_width() - 3.7).abs() < 1e-3);
     assert!((predicted(&model, -0.4) - (3.7 + 0.31 * 0.4)).abs() < 5e-4);
 }
 
@@ -33,7 +33,7 @@ fn a_constant_exponent_stays_and_the_level_follows() {
         model.advance_to(f64::from(k), 1e-6);
         model.update(&observed(3.7 - 0.31 * u, u), true);
     }
-    assert_eq!(model.exponent(), 0.25);
+    assert_eq!(model.estimate.exponent(), 0.25);
     assert!((predicted(&model, -0.4) - (3.7 + 0.31 * 0.4)).abs() < 1e-3);
 }
 
@@ -45,7 +45,7 @@ fn at_the_end_of_its_range_the_exponent_stays_and_the_width_is_still_predicted()
         model.advance_to(f64::from(k), 1e-7);
         model.update(&observed(3.7 - 0.05 * u, u), true);
     }
-    assert!((model.exponent() - 0.7 * 0.25).abs() < 1e-12);
+    assert!((model.estimate.exponent() - 0.7 * 0.25).abs() < 1e-12);
     assert!((predicted(&model, -0.4) - (3.7 + 0.05 * 0.4)).abs() < 2e-3, "{model:?}");
 }
 
@@ -58,7 +58,7 @@ fn an_exponent_that_is_taken_over_leaves_the_width_at_its_speed_as_it_is() {
     let there = observed(3.7, -0.4);
     let before = model.innovation(&there);
     model.take_exponent(0.3, -0.4);
-    assert_eq!(model.exponent(), 0.3);
+    assert_eq!(model.estimate.exponent(), 0.3);
     assert!((model.innovation(&there).by - before.by).abs() < 1e-12);
 }
 
@@ -70,7 +70,7 @@ fn an_outlier_as_first_width_is_corrected() {
         model.advance_to(f64::from(k), 1e-9);
         model.update(&observed(3.7, 0.0), true);
     }
-    assert!((model.ln_width() - 3.7).abs() < 1e-3, "{model:?}");
+    assert!((model.estimate.ln_width() - 3.7).abs() < 1e-3, "{model:?}");
 }
 
 #[test]
@@ -86,6 +86,6 @@ fn the_covariance_stays_positive_definite() {
         let u = 0.3 * f64::from(k).sin();
         model.advance_to(f64::from(k), 1e-8);
         model.update(&observed(3.7 - 0.22 * u, u), k % 3 != 0);
-        assert!(model.covariance.cholesky().is_some(), "{model:?}");
+        assert!(model.estimate.covariance.cholesky().is_some(), "{model:?}");
     }
 }
