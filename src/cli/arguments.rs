@@ -1,8 +1,10 @@
 //! Arguments that several commands have, and the error for wrong arguments.
 
+use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use crate::calibration::{exchange, file};
 use crate::core::Mm;
 
 /// Largest accepted length \[mm\]: 100 m; a larger number is probably mistyped.
@@ -41,15 +43,49 @@ pub fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_within(text, 0.1..=1e7, "expected a number of seconds, 0.1 or more")
 }
 
-/// Refuses an output file in a folder that does not exist, before the long work; `name` is the
-/// name of the option.
-pub fn check_writable(name: &str, path: &Path) -> Result<(), WrongArguments> {
+/// What kind of file a command writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Written {
+    /// A page of this program.
+    Page,
+    /// A calibration.
+    Calibration,
+    /// A camera in a format of ROS or OpenCV.
+    ForeignCamera,
+}
+
+impl Written {
+    fn is_kind_of(self, text: &str) -> bool {
+        match self {
+            Self::Page => text.starts_with("<!DOCTYPE html>") && text.contains("truebead"),
+            Self::Calibration => file::parse("", text).is_ok(),
+            Self::ForeignCamera => exchange::parse("", text).is_ok(),
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Page => "a page of this program",
+            Self::Calibration => "a calibration",
+            Self::ForeignCamera => "a camera of ROS or OpenCV",
+        }
+    }
+}
+
+/// Refuses an output file in a folder that does not exist, and one that would replace a file of another
+/// kind, before the long work; `name` is the name of the option.
+pub fn check_writable(name: &str, path: &Path, kind: Written) -> Result<(), WrongArguments> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
         refuse!("--{name} {}: no folder {}", path.display(), folder.display());
     }
     if path.is_dir() {
         refuse!("--{name} {}: a folder, expected a file", path.display());
+    }
+    let is_other = |bytes: Vec<u8>| !kind.is_kind_of(&String::from_utf8_lossy(&bytes));
+    if fs::read(path).is_ok_and(is_other) {
+        let (path, kind) = (path.display(), kind.name());
+        refuse!("--{name} {path}: this file exists and is not {kind}; name another, or remove it");
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 pub use self::arguments::CalibrateArgs;
 use self::conclusion::CalibrationResult;
 use self::images::{CalibrationImages, find_boards};
-use super::arguments::{WrongArguments, check_writable};
+use super::arguments::{Written, WrongArguments, check_writable};
 use super::print::print;
 use crate::calibration::board::Board;
 use crate::calibration::board_observation;
@@ -65,9 +65,8 @@ fn check_arguments(args: &CalibrateArgs) -> Result<(), WrongArguments> {
     if report == args.out {
         refuse!("--out and --report are both {}: name two files", report.display());
     }
-    for (name, path) in [("out", &args.out), ("report", &report)] {
-        check_writable(name, path)?;
-    }
+    check_writable("out", &args.out, Written::Calibration)?;
+    check_writable("report", &report, Written::Page)?;
     if args.board_thickness_mm < Mm::ZERO {
         refuse!("the board's thickness cannot be below 0 mm");
     }

@@ -8,7 +8,8 @@ use std::process::ExitCode;
 use clap::Args;
 use nalgebra::Point3;
 
-use super::arguments::{WrongArguments, check_writable};
+use super::arguments::{Written, WrongArguments, check_writable};
+use super::live_cell::simulated_camera;
 use super::print::warn;
 use super::schema;
 use crate::assembly::{ExtruderSide, LoadedCell, range_warning, read_cell, steady_state};
@@ -61,7 +62,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     };
     if let Some(report) = &args.report {
-        check_writable("report", report)?;
+        check_writable("report", report, Written::Page)?;
     }
     let loaded = LoadedCell::read(cell, Purpose::Measure)?;
     check_height(&loaded)?;
@@ -87,6 +88,7 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<ExitCode> {
             let Some(run) = &loaded.cell.run else { return Ok(ExitCode::SUCCESS) };
             about_purposes(run, &loaded.devices);
             about_robot(&loaded.devices);
+            about_camera(run, &loaded.devices);
             about_run(run);
             about_controller(&loaded, run);
             about_extruder(&loaded, run, side.as_ref())?;
@@ -303,12 +305,20 @@ fn about_robot(devices: &Devices) {
     }
 }
 
-fn about_run(run: &RunPart) {
+fn about_camera(run: &RunPart, devices: &Devices) {
+    say!("  camera       {}, {} frames a second", run.camera.source_name, run.camera.rate_hz);
     if let ImageSource::Path(path) = &run.camera.source
         && !path.exists()
     {
         say!("  WARNING      camera.source: {} is not there now", path.display());
     }
+    let robot = devices.robot.as_ref().map(|robot| robot.driver.address());
+    if let Some(words) = robot.and_then(|robot| simulated_camera(run, &robot)) {
+        say!("  WARNING      {words}");
+    }
+}
+
+fn about_run(run: &RunPart) {
     let seconds = run.robot.start_length.get() / run.robot.start_speed.get();
     say!(
         "  control      begins {:.0} mm into the bead, after {seconds:.1} s at {}",

@@ -37,7 +37,8 @@ pub struct DemoArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// How long to run [s]
-    #[arg(long, value_name = "S", default_value = "20", value_parser = parse_seconds)]
+    #[arg(long, value_name = "S", default_value = "20", allow_negative_numbers = true,
+        value_parser = parse_seconds)]
     seconds: f64,
 }
 

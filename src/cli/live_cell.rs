@@ -10,7 +10,7 @@ use super::arguments::refuse_a_recording_in;
 use super::outcome;
 use super::print::{Verbosity, warn};
 use crate::assembly::{LoadedCell, range_warning};
-use crate::cell::file::RunPart;
+use crate::cell::file::{ImageSource, RunPart};
 use crate::core::Span;
 use crate::drivers::robot::RobotDriver;
 use crate::io::clock::RunClock;
@@ -72,6 +72,7 @@ pub fn live(
     let run = loaded.cell.run.clone().context("the cell was not read for a run")?;
     let robot = loaded.devices.robot.as_ref().context("the cell names no robot")?;
     let robot = Arc::clone(&robot.driver);
+    warn(simulated_camera(&run, &robot.address()).as_slice());
     let (extruder, extruder_files) = live_extruder(&loaded, &run)?;
     let stop = StopSignal::install().context("cannot wait for signals")?;
     let strategy = extruder.as_ref().map(|side| &side.setup.strategy);
@@ -118,6 +119,17 @@ pub fn live(
     });
     status.finish();
     Ok(report?)
+}
+
+/// A warning where the camera shows a simulated bead and the robot is not on this PC.
+pub fn simulated_camera(run: &RunPart, robot: &str) -> Option<String> {
+    let is_here = ["127.", "localhost:", "[::1]:"].iter().any(|here| robot.starts_with(here));
+    (run.camera.source == ImageSource::Rendered && !is_here).then(|| {
+        format!(
+            "camera.source is \"rendered\", a simulated bead, but the robot at {robot} is not on \
+             this PC: it would be driven by widths of bead that it does not lay"
+        )
+    })
 }
 
 /// Begins the log of a cell. `header` are facts under the report's title; the calibration is added

@@ -9,7 +9,7 @@ pub use self::arguments::ConvertArgs;
 use self::arguments::To;
 use crate::calibration::exchange::{Import, Intrinsics, opencv, ros};
 use crate::calibration::{Calibration, CalibrationQuality};
-use crate::cli::arguments::{WrongArguments, check_writable};
+use crate::cli::arguments::{Written, WrongArguments, check_writable};
 use crate::cli::print::Verbosity;
 use crate::core::Mm;
 use crate::io::atomic_file::write_atomic;
@@ -72,7 +72,8 @@ fn target(args: &ConvertArgs) -> Result<To, WrongArguments> {
 }
 
 fn check(args: &ConvertArgs, to: To) -> Result<(), WrongArguments> {
-    check_writable("out", &args.out)?;
+    let kind = if to == To::Truebead { Written::Calibration } else { Written::ForeignCamera };
+    check_writable("out", &args.out, kind)?;
     let input = args.input.display();
     if !ends_in(&args.input, TOML) && !ends_in(&args.input, YAML) {
         refuse!(

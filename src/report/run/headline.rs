@@ -34,6 +34,9 @@ pub fn verdict(summary: &Summary, max_rejected_fraction: f64) -> Verdict {
     if let Some(control) = &summary.control {
         let (control_level, more) = control_sentences(control);
         level = level.max(control_level);
+        if control.width_error_rms_settled_mm.is_none() && !is_excited(summary) {
+            level = level.max(VerdictLevel::Caution);
+        }
         sentences.extend(more);
         if let Some(sentence) = far_off(control, summary) {
             level = level.max(VerdictLevel::Caution);
