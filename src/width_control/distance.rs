@@ -16,7 +16,6 @@
 
 mod estimate;
 mod flow_step;
-mod outlier_run;
 mod pulsating_bead;
 mod pulsation;
 mod pulse_counter;
@@ -26,6 +25,8 @@ mod width_model;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::bead_noise::{BeadRoughness, WidthNoise};
@@ -34,13 +35,12 @@ use crate::core::{Mm, MmPerS, Rpm, Span, Stamp};
 
 use estimate::Exponent;
 use flow_step::StepDetector;
-use outlier_run::OutlierRun;
 use pulsation::FlowPulsation;
 pub use pulsation::PERIODS_S;
 pub use pulse_counter::ScrewPulses;
+use sample::MatchedWidth;
 pub use sample::WidthReading;
-use sample::{GaugeInterval, MatchedWidth};
-use width_model::{BETWEEN_BEADS_SIGMA, ExpectedBead, WidthModel, WidthObservation};
+use width_model::{BETWEEN_BEADS_SIGMA, WidthModel, WidthObservation};
 
 /// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +75,7 @@ pub enum WidthUse {
     /// It updated the model.
     #[default]
     Taken,
-    /// It is too far from its prediction; several that agree would make a flow change.
+    /// It is too far from its prediction, and updated the model with so small a weight that it just is not.
     Outlier,
     /// With the widths before it, it shows that the flow has changed, or that it has not, after all.
     Change,
@@ -117,7 +117,6 @@ pub struct DistanceController {
     model: WidthModel,
     noise: WidthNoise,
     steps: StepDetector,
-    outliers: OutlierRun,
     pulsation: FlowPulsation,
     /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
     unmatched_since_mm: Option<f64>,
@@ -129,7 +128,12 @@ impl DistanceController {
     /// A controller before the first width.
     pub fn new(settings: DistanceSettings) -> Self {
         let DistanceSettings { offset, gauge, .. } = settings;
-        let exponent = Exponent { prior: settings.exponent, learns: settings.learns_exponent };
+        let exponent = Exponent { value: settings.exponent, learns: settings.learns_exponent };
+        let pulsation = if settings.cancels_pulsation {
+            FlowPulsation::new(exponent, settings.screw_pulses)
+        } else {
+            FlowPulsation::default()
+        };
         let history_mm = HISTORY_FACTOR * (offset + gauge).get() + MAX_UNMATCHED_MM;
         Self {
             settings,
@@ -137,8 +141,7 @@ impl DistanceController {
             model: WidthModel::new(exponent),
             noise: WidthNoise::new(settings.roughness, gauge.get()),
             steps: StepDetector::new(gauge.get()),
-            outliers: OutlierRun::default(),
-            pulsation: FlowPulsation::new(exponent, settings.screw_pulses),
+            pulsation,
             unmatched_since_mm: None,
             is_unmatched: false,
         }
@@ -148,9 +151,9 @@ impl DistanceController {
     pub fn begin_bead(&mut self) {
         self.speed_history.clear();
         self.steps.clear();
-        self.outliers = OutlierRun::default();
         self.model.begin_bead();
-        self.pulsation.shift(0.0, BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA);
+        let change = BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA;
+        self.pulsation.estimates().for_each(|one| one.shift(0.0, change));
         self.noise.begin_bead();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
@@ -196,9 +199,8 @@ impl DistanceController {
             return None;
         }
         let laid_s = from.secs()..(from + lasts).secs();
-        let ExpectedBead { ln_width, exponent } =
-            self.pulsation.bead(&laid_s, self.model.expected());
-        let ln_speed = (ln_width - width.get().ln()) / exponent;
+        let bead = self.pulsation.bead(&laid_s, &self.model.estimate);
+        let ln_speed = (bead.x - width.get().ln()) / bead.y;
         let speed = self.settings.reference_speed.get()
             * ln_speed.clamp(-MAX_LN_SPEED_RATIO, MAX_LN_SPEED_RATIO).exp();
         MmPerS::new(speed).ok()
@@ -207,8 +209,8 @@ impl DistanceController {
     /// Notices when widths cannot be matched to speeds for longer than the start of a bead
     /// takes to come under the camera.
     fn check_history(&mut self, nozzle_path: f64) {
-        let (position, half) = (self.gauge_centre(nozzle_path), 0.5 * self.settings.gauge.get());
-        if self.speed_history.mean_over(position - half, position + half).is_some() {
+        let gauge_mm = self.gauge_mm(nozzle_path);
+        if self.speed_history.mean_over(gauge_mm.start, gauge_mm.end).is_some() {
             self.unmatched_since_mm = None;
             return;
         }
@@ -217,38 +219,31 @@ impl DistanceController {
         self.is_unmatched |= nozzle_path - since > limit;
     }
 
-    /// Middle of the gauge along the path \[mm\].
-    fn gauge_centre(&self, nozzle_path: f64) -> f64 {
-        nozzle_path - self.settings.offset.get()
+    /// The gauge along the path \[mm\].
+    fn gauge_mm(&self, nozzle_path: f64) -> Range<f64> {
+        let (centre, half) =
+            (nozzle_path - self.settings.offset.get(), 0.5 * self.settings.gauge.get());
+        centre - half..centre + half
     }
 
     fn match_speed(&self, nozzle_path: f64, reading: WidthReading) -> Option<MatchedWidth> {
-        if reading.width <= Mm::ZERO || self.speed_history.is_empty() {
+        if reading.width <= Mm::ZERO {
             return None;
         }
-        let gauge = GaugeInterval {
-            centre_mm: self.gauge_centre(nozzle_path),
-            length_mm: self.settings.gauge.get(),
-            centre_tolerance_mm: OFFSET_SIGMAS * self.settings.offset_sigma.get(),
-        };
-        MatchedWidth::new(&self.speed_history, gauge, reading, self.model.estimate.exponent())
+        let tolerance_mm = OFFSET_SIGMAS * self.settings.offset_sigma.get();
+        let (gauge_mm, exponent) = (self.gauge_mm(nozzle_path), self.model.estimate.exponent());
+        MatchedWidth::new(&self.speed_history, &gauge_mm, tolerance_mm, reading, exponent)
     }
 
     fn take_sample(&mut self, mut sample: MatchedWidth) -> WidthUse {
-        let spacing = self.model.distance_to(sample.position_mm);
-        let drift = self.drift_per_mm() * spacing;
+        let spacing = self.model.advance_to(sample.position_mm);
+        let drift = self.settings.drift_per_root_m.powi(2) / 1e3 * spacing;
         sample.observation.variance += self.noise.variance(spacing);
-        self.model.advance_to(sample.position_mm, drift);
+        self.model.estimate.shift(0.0, drift);
         if let Some(wider) = self.model.move_to(sample.observation.ln_speed) {
-            self.pulsation.widen_exponent(&wider);
+            self.pulsation.estimates().for_each(|one| one.widen_exponent(&wider));
         }
-        if self.settings.cancels_pulsation {
-            self.pulsation.see(&sample.laid_s);
-        }
-        if self.pulsation.is_found() {
-            let expected = self.pulsation.bead(&sample.laid_s, self.model.expected());
-            self.model.take_exponent(expected.exponent, sample.observation.ln_speed);
-        }
+        self.pulsation.see(&sample.laid_s);
         let ln_width = sample.observation.ln_width - self.pulsation.mean(&sample.laid_s);
         let mut steady = WidthObservation { ln_width, ..sample.observation };
         if !self.steps.is_under_way() && self.model.estimate.is_known() {
@@ -257,11 +252,7 @@ impl DistanceController {
         }
         steady.variance *= self.noise.excess();
         let taken = self.update(sample.position_mm, &steady);
-        // Outliers and widths within a step say nothing of a pulsation.
-        let is_used = !matches!(taken, WidthUse::Change | WidthUse::Outlier);
-        if is_used && self.settings.cancels_pulsation {
-            self.pulsation.update(&sample.observation, &sample.laid_s, drift);
-        }
+        self.pulsation.update(&sample.observation, &sample.laid_s, drift);
         taken
     }
 
@@ -276,27 +267,18 @@ impl DistanceController {
         if let Some(model) = self.steps.find() {
             let predicted = |model: &WidthModel| observation.predicted(&model.estimate.state);
             let change = predicted(&model) - predicted(&self.model);
-            self.pulsation.shift(change, change * change);
+            self.pulsation.estimates().for_each(|one| one.shift(change, change * change));
             self.model = model;
-            self.outliers = OutlierRun::default();
             return WidthUse::Change;
         }
         let innovation = self.model.innovation(observation);
         if innovation.is_outlier() {
-            if !self.outliers.agree(innovation, front, self.settings.gauge.get()) {
-                return WidthUse::Outlier;
-            }
             self.model.update(&observation.weighted_as_no_outlier(&innovation), false);
-            return WidthUse::Taken;
+            return WidthUse::Outlier;
         }
-        self.outliers = OutlierRun::default();
         let informs = self.model.informs_exponent(observation) && !self.pulsation.is_found();
         self.model.update(observation, informs);
         WidthUse::Taken
-    }
-
-    fn drift_per_mm(&self) -> f64 {
-        self.settings.drift_per_root_m.powi(2) / 1e3
     }
 
     fn trace(&self, use_of_width: WidthUse) -> DistanceTrace {

@@ -2,8 +2,6 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::width_model::WidthObservation;
-
 /// Standard deviation of ln A after the first width, which may be an outlier.
 const FIRST_SIGMA: f64 = 0.1;
 /// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
@@ -25,7 +23,7 @@ const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exponent {
     /// Its value.
-    pub prior: f64,
+    pub value: f64,
     /// Whether it is estimated from the widths.
     pub learns: bool,
 }
@@ -37,7 +35,8 @@ pub struct BeadEstimate {
     pub state: Vector4<f64>,
     /// Their covariance.
     pub covariance: Matrix4<f64>,
-    exponent: Exponent,
+    /// What the cell states of b.
+    pub prior: Exponent,
     is_known: bool,
 }
 
@@ -52,22 +51,20 @@ pub struct WiderExponent {
 
 impl BeadEstimate {
     /// Before the first width. The components that the filter adds are 0 with a variance.
-    pub fn new(exponent: Exponent, added: f64) -> Self {
-        let of_b =
-            if exponent.learns { (SIGMA * exponent.prior).powi(2) } else { CONSTANT_VARIANCE };
+    pub fn new(prior: Exponent, added: f64) -> Self {
+        let of_b = if prior.learns { (SIGMA * prior.value).powi(2) } else { CONSTANT_VARIANCE };
         let spread = Vector4::new(FIRST_SIGMA * FIRST_SIGMA, of_b, added, added);
         Self {
-            state: Vector4::new(0.0, exponent.prior, 0.0, 0.0),
+            state: Vector4::new(0.0, prior.value, 0.0, 0.0),
             covariance: Matrix4::from_diagonal(&spread),
-            exponent,
+            prior,
             is_known: false,
         }
     }
 
-    /// The first width.
-    pub fn begin(&mut self, observation: &WidthObservation) {
-        let ln_speed = observation.ln_speed;
-        self.state.x = observation.ln_width + self.exponent() * ln_speed;
+    /// The first width: ln w of bead that was laid at ln(v/v₀).
+    pub fn begin(&mut self, ln_width: f64, ln_speed: f64) {
+        self.state.x = ln_width + self.exponent() * ln_speed;
         let both = ln_speed * self.covariance.m22;
         (self.covariance.m12, self.covariance.m21) = (both, both);
         self.covariance.m11 = FIRST_SIGMA * FIRST_SIGMA + ln_speed * both;
@@ -114,16 +111,16 @@ impl BeadEstimate {
     /// Clamps b to its range, and moves the others along the correlation. The range of a constant
     /// exponent is its value.
     pub fn keep_exponent_in_range(&mut self) {
-        let Exponent { prior, learns } = self.exponent;
+        let Exponent { value, learns } = self.prior;
         let (min, max) = if learns { RANGE } else { (1.0, 1.0) };
-        let within = self.state.y.clamp(min * prior, max * prior);
+        let within = self.state.y.clamp(min * value, max * value);
         if within != self.state.y {
             let variance = self.covariance.m22;
             let slopes = self.covariance.column(1) / variance;
             self.state += slopes * (within - self.state.y);
             self.state.y = within;
             self.covariance -= slopes * slopes.transpose() * variance;
-            self.covariance.m22 = variance.min((SIGMA_AT_RANGE_END * prior).powi(2));
+            self.covariance.m22 = variance.min((SIGMA_AT_RANGE_END * value).powi(2));
         }
     }
 }

@@ -50,7 +50,6 @@ pub struct PulsatingBead {
     rad_per_unit: f64,
     /// Its drift over the stated one, as a variance.
     drift_ratio: f64,
-    exponent: Exponent,
     /// What is known of it.
     pub estimate: BeadEstimate,
 }
@@ -63,7 +62,6 @@ impl PulsatingBead {
         Self {
             rad_per_unit: TAU * frequency,
             drift_ratio,
-            exponent,
             estimate: BeadEstimate::new(exponent, part),
         }
     }
@@ -71,7 +69,7 @@ impl PulsatingBead {
     /// Before the first width of a bead: of all that was known, b remains.
     pub fn begin_again(&mut self) {
         let before = self.estimate;
-        *self = Self::new(self.frequency(), self.drift_ratio, self.exponent);
+        *self = Self::new(self.frequency(), self.drift_ratio, before.prior);
         self.estimate.state.y = before.state.y;
         self.estimate.covariance.m22 = before.covariance.m22;
     }
@@ -108,7 +106,7 @@ impl PulsatingBead {
     ) -> f64 {
         let WidthObservation { ln_width, ln_speed, variance, .. } = *observation;
         if !self.estimate.is_known() {
-            self.estimate.begin(observation);
+            self.estimate.begin(ln_width, ln_speed);
             return 0.0;
         }
         let harmonic = phases.mean();
@@ -163,7 +161,7 @@ mod tests {
     use super::*;
     use crate::sim::hash;
 
-    const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
+    const EXPONENT: Exponent = Exponent { value: 0.25, learns: true };
 
     fn width(ln_width: f64, ln_speed: f64) -> WidthObservation {
         WidthObservation { ln_width, ln_speed, ln_speed_beside: [0.0; 2], variance: 1e-6 }
@@ -228,11 +226,11 @@ mod tests {
             add(&mut bead, at, &width(3.7 + 0.001 * width_noise, 0.002 * speed_noise));
         }
         assert!(
-            (bead.estimate.exponent() - EXPONENT.prior).abs() < 0.01,
+            (bead.estimate.exponent() - EXPONENT.value).abs() < 0.01,
             "{}",
             bead.estimate.exponent()
         );
-        assert!(bead.estimate.covariance.m22 > 0.8 * (0.4 * EXPONENT.prior).powi(2));
+        assert!(bead.estimate.covariance.m22 > 0.8 * (0.4 * EXPONENT.value).powi(2));
     }
 
     #[test]

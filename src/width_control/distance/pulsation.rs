@@ -4,10 +4,12 @@
 
 use std::ops::Range;
 
-use super::estimate::{Exponent, WiderExponent};
+use nalgebra::Vector2;
+
+use super::estimate::{BeadEstimate, Exponent};
 use super::pulsating_bead::{Phases, PulsatingBead};
 use super::pulse_counter::{PulseCounter, ScrewPulses};
-use super::width_model::{ExpectedBead, WidthObservation};
+use super::width_model::WidthObservation;
 use crate::core::Rpm;
 
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
@@ -33,8 +35,8 @@ const MIN_WEIGHT: f64 = 1e-3;
 /// Longest time between two widths over which phases are kept \[s\].
 const LONGEST_GAP_S: f64 = 3.0;
 
-/// Hypotheses of all frequencies, and of none.
-#[derive(Debug, Clone, PartialEq)]
+/// Hypotheses of all frequencies, and of none. Without any a pulsation is not looked for.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FlowPulsation {
     hypotheses: Vec<Hypothesis>,
     /// Counts pulses, the unit of the period, where a screw makes them; none where it is seconds.
@@ -156,29 +158,20 @@ impl FlowPulsation {
         }
     }
 
-    /// ln A of every hypothesis has changed, and is less certain by a variance.
-    pub fn shift(&mut self, by: f64, variance: f64) {
-        for one in &mut self.hypotheses {
-            one.bead.estimate.shift(by, variance);
-        }
+    /// The estimates of all hypotheses.
+    pub fn estimates(&mut self) -> impl Iterator<Item = &mut BeadEstimate> {
+        self.hypotheses.iter_mut().map(|one| &mut one.bead.estimate)
     }
 
-    /// b of every hypothesis is less certain.
-    pub fn widen_exponent(&mut self, by: &WiderExponent) {
-        for one in &mut self.hypotheses {
-            one.bead.estimate.widen_exponent(by);
-        }
-    }
-
-    /// The bead that is laid over a time \[s\]: the mean of all hypotheses. Without a pulsation it is as
-    /// `steady` says.
-    pub fn bead(&self, laid_s: &Range<f64>, steady: ExpectedBead) -> ExpectedBead {
+    /// ln A and b of the bead that is laid over a time \[s\]: the mean of all hypotheses. Without a
+    /// pulsation it is as `steady` says.
+    pub fn bead(&self, laid_s: &Range<f64>, steady: &BeadEstimate) -> Vector2<f64> {
+        let steady = steady.state.xy();
         let mut expected = steady;
         let Some(laid) = self.phases(laid_s) else { return steady };
         for Hypothesis { bead, weight, .. } in self.pulsating() {
-            expected.ln_width +=
-                weight * (bead.estimate.ln_width() + bead.mean(&laid) - steady.ln_width);
-            expected.exponent += weight * (bead.estimate.exponent() - steady.exponent);
+            let pulsation = Vector2::new(bead.mean(&laid), 0.0);
+            expected += (bead.estimate.state.xy() + pulsation - steady) * *weight;
         }
         expected
     }
@@ -228,7 +221,7 @@ mod tests {
     use super::*;
     use crate::sim::hash;
 
-    const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
+    const EXPONENT: Exponent = Exponent { value: 0.25, learns: true };
 
     fn width(ln_width: f64, variance: f64) -> WidthObservation {
         WidthObservation { ln_width, ln_speed: 0.0, ln_speed_beside: [0.0; 2], variance }

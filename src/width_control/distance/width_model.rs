@@ -33,7 +33,6 @@ pub const MAX_SQUARED_INNOVATION: f64 = 9.0;
 pub struct WidthModel {
     /// The estimate.
     pub estimate: BeadEstimate,
-    prior: Exponent,
     position_mm: Option<f64>,
     /// Smallest and largest ln(v/v₀) of all widths.
     ln_speeds: Option<(f64, f64)>,
@@ -51,15 +50,6 @@ pub struct WidthObservation {
     pub ln_speed_beside: [f64; 2],
     /// Variance of `ln_width`, without that of the offset.
     pub variance: f64,
-}
-
-/// What ln w = ln A − b·ln(v/v₀) of a piece of bead is expected to be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ExpectedBead {
-    /// ln A, with its pulsation.
-    pub ln_width: f64,
-    /// b.
-    pub exponent: f64,
 }
 
 /// Innovation: measured less predicted ln w.
@@ -87,7 +77,7 @@ impl WidthModel {
     /// Before the first width.
     pub fn new(exponent: Exponent) -> Self {
         let estimate = BeadEstimate::new(exponent, OFFSET_ERROR_VARIANCE);
-        Self { estimate, prior: exponent, position_mm: None, ln_speeds: None }
+        Self { estimate, position_mm: None, ln_speeds: None }
     }
 
     /// A new bead, whose flow may differ.
@@ -100,14 +90,9 @@ impl WidthModel {
     /// best, and is the same wherever the camera may look. Beside a change of the speed an error of
     /// the offset would be taken for one of b.
     pub fn informs_exponent(&self, observation: &WidthObservation) -> bool {
-        self.estimate.shows_exponent(observation.ln_speed) && !self.informs_offset(observation)
-    }
-
-    /// Whether a width informs the errors of the offset: one within its tolerance changes it by more
-    /// than what no part of the model describes. Elsewhere a slow wave would be taken for them.
-    fn informs_offset(&self, observation: &WidthObservation) -> bool {
-        let exponent = self.estimate.exponent();
-        observation.ln_speed_beside.iter().any(|by| (exponent * by).abs() >= OTHER_SIGMA)
+        let effect = |by: &f64| (self.estimate.exponent() * by).abs();
+        self.estimate.shows_exponent(observation.ln_speed)
+            && observation.ln_speed_beside.iter().map(effect).all(|effect| effect < OTHER_SIGMA)
     }
 
     /// Standard deviation of ln A, given b.
@@ -116,15 +101,11 @@ impl WidthModel {
         (of.m11 - of.m12 * of.m12 / of.m22).max(0.0).sqrt()
     }
 
-    /// Path from the newest position to another \[mm\]; 0 backwards.
-    pub fn distance_to(&self, position_mm: f64) -> f64 {
-        self.position_mm.map_or(0.0, |last| (position_mm - last).max(0.0))
-    }
-
-    /// Advances to a position; ln A has drifted by a variance.
-    pub fn advance_to(&mut self, position_mm: f64, drift: f64) {
-        self.position_mm = Some(self.position_mm.map_or(position_mm, |last| last.max(position_mm)));
-        self.estimate.shift(0.0, drift);
+    /// Advances to a position. Returns the path to it \[mm\]; 0 backwards.
+    pub fn advance_to(&mut self, position_mm: f64) -> f64 {
+        let last = self.position_mm.unwrap_or(position_mm);
+        self.position_mm = Some(last.max(position_mm));
+        (position_mm - last).max(0.0)
     }
 
     /// The innovation of an observation.
@@ -137,11 +118,11 @@ impl WidthModel {
         }
     }
 
-    /// Updates the model with a width. Where `learns` is false b stays, away from changes of the speed
-    /// the errors of the offset stay, and their uncertainty is considered (Schmidt 1966).
+    /// Updates the model with a width. Where `learns` is false b stays, and its uncertainty is considered
+    /// (Schmidt 1966).
     pub fn update(&mut self, observation: &WidthObservation, learns: bool) {
         if !self.estimate.is_known() {
-            self.estimate.begin(observation);
+            self.estimate.begin(observation.ln_width, observation.ln_speed);
             return;
         }
         let innovation = self.innovation(observation);
@@ -152,21 +133,13 @@ impl WidthModel {
         let slopes = observation.slopes(state);
         let informed = covariance * slopes;
         let mut gain = informed / (spread + noise);
-        gain.y = if learns && self.prior.learns {
+        gain.y = if learns && self.estimate.prior.learns {
             informed.y / (spread + noise + OTHER_SIGMA * OTHER_SIGMA)
         } else {
             0.0
         };
-        if !self.informs_offset(observation) {
-            (gain.z, gain.w) = (0.0, 0.0);
-        }
         let covariance = updated_covariance(covariance, &gain, &slopes, noise);
         *self = self.with_estimate(state + gain * innovation.by, covariance);
-    }
-
-    /// The bead that it expects.
-    pub fn expected(&self) -> ExpectedBead {
-        ExpectedBead { ln_width: self.estimate.ln_width(), exponent: self.estimate.exponent() }
     }
 
     /// The model with another state.
@@ -181,22 +154,14 @@ impl WidthModel {
         let (slowest, fastest) = self.ln_speeds.unwrap_or((ln_speed, ln_speed));
         let nearest = ln_speed.clamp(slowest, fastest);
         self.ln_speeds = Some((slowest.min(ln_speed), fastest.max(ln_speed)));
-        if !self.estimate.is_known() || !self.prior.learns || nearest == ln_speed {
+        if !self.estimate.is_known() || !self.estimate.prior.learns || nearest == ln_speed {
             return None;
         }
         let beyond = (ln_speed - nearest).abs();
-        let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior.prior).powi(2);
+        let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.estimate.prior.value).powi(2);
         let wider = WiderExponent { ln_speed: nearest, variance };
         self.estimate.widen_exponent(&wider);
         Some(wider)
-    }
-
-    /// Takes over a b that was estimated elsewhere. The width at ln(v/v₀) stays as it is, and the variance
-    /// of b that of this model's own widths.
-    pub fn take_exponent(&mut self, exponent: f64, ln_speed: f64) {
-        let state = &mut self.estimate.state;
-        state.x += (exponent - state.y) * ln_speed;
-        state.y = exponent;
     }
 }
 

@@ -8,7 +8,7 @@ use crate::width_control::distance::estimate::Exponent;
 const GAUGE: f64 = 63.0;
 
 fn known() -> WidthModel {
-    let mut model = WidthModel::new(Exponent { prior: 0.25, learns: true });
+    let mut model = WidthModel::new(Exponent { value: 0.25, learns: true });
     for _ in 0..50 {
         model.update(&width(3.7), false);
     }
