@@ -126,3 +126,28 @@ pub fn refuse_replacing(path: &Path, what: &str) -> Result<(), WrongArguments> {
         path.display()
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_by_one_of_its_kind_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let calibration = include_str!("../../calib/example.toml");
+        let page = "<!DOCTYPE html><title>truebead</title>";
+        let cell = include_str!("../../cells/demo.toml");
+        let accepts = |kind: Written, text: &str| {
+            let path = folder.path().join("file");
+            fs::write(&path, text).unwrap();
+            check_writable("out", &path, kind).is_ok()
+        };
+        for kind in [Written::Page, Written::Calibration, Written::ForeignCamera] {
+            let is_its_own = [page, calibration, cell, ""].map(|text| accepts(kind, text));
+            let own = [Written::Page, Written::Calibration].map(|own| own == kind);
+            assert_eq!(is_its_own, [own[0], own[1], false, false], "{kind:?}");
+            assert!(check_writable("out", &folder.path().join("new"), kind).is_ok());
+            assert!(check_writable("out", folder.path(), kind).is_err());
+        }
+    }
+}

@@ -126,8 +126,7 @@ pub fn simulated_camera(run: &RunPart, robot: &str) -> Option<String> {
     let is_here = ["127.", "localhost:", "[::1]:"].iter().any(|here| robot.starts_with(here));
     (run.camera.source == ImageSource::Rendered && !is_here).then(|| {
         format!(
-            "camera.source is \"rendered\", a simulated bead, but the robot at {robot} is not on \
-             this PC: it would be driven by widths of bead that it does not lay"
+            "the camera is \"rendered\", a simulated bead, but the robot at {robot} is a real one"
         )
     })
 }

@@ -20,8 +20,9 @@ use crate::studies::control::Case;
 Example:
   truebead lab control steps --out control
 
-Prints a table and leaves control.json, which is written anew after each case. Every figure is that of the bead's true width, of the true
-pressure at the nozzle, or of when control held and the robot stopped.
+Prints a table and leaves control.json, which is written anew after each case. Every figure is
+that of the bead's true width, of the true pressure at the nozzle, or of when control held and
+the robot stopped.
 Status 1 if a figure is above what is required.")]
 pub struct ControlArgs {
     /// The cases; all of them where none is named

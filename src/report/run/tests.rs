@@ -1,3 +1,4 @@
+use crate::report::html::VerdictLevel;
 use crate::report::synthetic;
 use crate::rows::summary::Summary;
 
@@ -117,4 +118,18 @@ fn curves_keep_to_the_grid_that_they_are_drawn_on() {
     let outer = page.matches("<svg viewBox").count();
     assert_eq!(outer, page.matches("\" role=\"img\"").count());
     assert!(page.contains("svg[role=\"img\"] {"));
+}
+
+#[test]
+fn a_run_that_was_too_short_to_be_judged_is_not_good() {
+    let (mut summary, _) = page_of("hours", synthetic::hours);
+    let control = summary.control.as_mut().unwrap();
+    (control.faults, control.limited_s, control.width_error_rms_settled_mm) = (0, 0.0, Some(0.01));
+    control.held_for_s.clear();
+    (control.wrong_offset, control.tolerance) = (None, None);
+    let judged = super::headline::verdict(&summary, 1.0);
+    summary.control.as_mut().unwrap().width_error_rms_settled_mm = None;
+    let too_short = super::headline::verdict(&summary, 1.0);
+    assert_eq!(too_short.level, VerdictLevel::Caution, "{too_short:?}");
+    assert_eq!(judged.level, VerdictLevel::Good, "{judged:?}");
 }
