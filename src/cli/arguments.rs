@@ -83,7 +83,7 @@ pub fn check_writable(name: &str, path: &Path, kind: Written) -> Result<(), Wron
         refuse!("--{name} {}: a folder, expected a file", path.display());
     }
     let is_other = |bytes: Vec<u8>| !kind.is_kind_of(&String::from_utf8_lossy(&bytes));
-    if fs::read(path).is_ok_and(is_other) {
+    if fs::read(path).is_ok_and(|bytes| !bytes.is_empty() && is_other(bytes)) {
         let (path, kind) = (path.display(), kind.name());
         refuse!("--{name} {path}: this file exists and is not {kind}; name another, or remove it");
     }
@@ -136,6 +136,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let calibration = include_str!("../../calib/example.toml");
         let page = "<!DOCTYPE html><title>truebead</title>";
+        let foreign = "\
+            image_width: 640\nimage_height: 480\ncamera_name: cell\n\
+            camera_matrix: {rows: 3, cols: 3, data: [800, 0, 320, 0, 800, 240, 0, 0, 1]}\n\
+            distortion_model: plumb_bob\n\
+            distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n";
         let cell = include_str!("../../cells/demo.toml");
         let accepts = |kind: Written, text: &str| {
             let path = folder.path().join("file");
@@ -143,9 +148,12 @@ mod tests {
             check_writable("out", &path, kind).is_ok()
         };
         for kind in [Written::Page, Written::Calibration, Written::ForeignCamera] {
-            let is_its_own = [page, calibration, cell, ""].map(|text| accepts(kind, text));
-            let own = [Written::Page, Written::Calibration].map(|own| own == kind);
-            assert_eq!(is_its_own, [own[0], own[1], false, false], "{kind:?}");
+            let texts = [page, calibration, foreign, cell, ""];
+            let [is_page, is_calibration, is_foreign] =
+                [Written::Page, Written::Calibration, Written::ForeignCamera]
+                    .map(|own| own == kind);
+            let expected = [is_page, is_calibration, is_foreign, false, true];
+            assert_eq!(texts.map(|text| accepts(kind, text)), expected, "{kind:?}");
             assert!(check_writable("out", &folder.path().join("new"), kind).is_ok());
             assert!(check_writable("out", folder.path(), kind).is_err());
         }

@@ -123,12 +123,18 @@ pub fn live(
 
 /// A warning where the camera shows a simulated bead and the robot is not on this PC.
 pub fn simulated_camera(run: &RunPart, robot: &str) -> Option<String> {
-    let is_here = ["127.", "localhost:", "[::1]:"].iter().any(|here| robot.starts_with(here));
-    (run.camera.source == ImageSource::Rendered && !is_here).then(|| {
+    (run.camera.source == ImageSource::Rendered && is_elsewhere(robot)).then(|| {
         format!(
-            "the camera is \"rendered\", a simulated bead, but the robot at {robot} is a real one"
+            "the camera is \"rendered\", a simulated bead, but the robot at {robot} is not on this PC"
         )
     })
+}
+
+/// Whether this is `host:port` with another PC's host.
+fn is_elsewhere(address: &str) -> bool {
+    let Some((host, port)) = address.rsplit_once(':') else { return false };
+    let is_here = host.starts_with("127.") || ["localhost", "[::1]"].contains(&host);
+    port.parse::<u16>().is_ok() && !is_here
 }
 
 /// Begins the log of a cell. `header` are facts under the report's title; the calibration is added
@@ -193,4 +199,19 @@ fn live_extruder(
         valid_ms: part.extruder.valid_ms,
     };
     Ok((Some(live), side.files))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_is_elsewhere_where_its_host_is_not_this_pc() {
+        for here in ["127.0.0.1:5653", "localhost:5653", "[::1]:5653", "runs/commands.csv"] {
+            assert!(!is_elsewhere(here), "{here}");
+        }
+        for elsewhere in ["192.168.0.20:5653", "robot:5653", "[fe80::2]:5653"] {
+            assert!(is_elsewhere(elsewhere), "{elsewhere}");
+        }
+    }
 }

@@ -75,7 +75,8 @@ pub enum WidthUse {
     /// It updated the model.
     #[default]
     Taken,
-    /// It is too far from its prediction, and updated the model with so small a weight that it just is not.
+    /// It is 3.5 standard deviations or more from its prediction; it updated the model with so much noise
+    /// that it just is not.
     Outlier,
     /// With the widths before it, it shows that the flow has changed, or that it has not, after all.
     Change,
@@ -92,7 +93,7 @@ pub struct DistanceTrace {
     pub level_mm: Mm,
     /// Its standard deviation, given the exponent.
     pub level_sigma_mm: Mm,
-    /// Exponent b.
+    /// Exponent b of the model; where a pulsation is found, the speed follows that of its hypotheses.
     pub exponent: f64,
     /// Period of a pulsation of the flow, where one is detected \[s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -129,11 +130,8 @@ impl DistanceController {
     pub fn new(settings: DistanceSettings) -> Self {
         let DistanceSettings { offset, gauge, .. } = settings;
         let exponent = Exponent { value: settings.exponent, learns: settings.learns_exponent };
-        let pulsation = if settings.cancels_pulsation {
-            FlowPulsation::new(exponent, settings.screw_pulses)
-        } else {
-            FlowPulsation::default()
-        };
+        let searched = || FlowPulsation::new(exponent, settings.screw_pulses);
+        let pulsation = settings.cancels_pulsation.then(searched).unwrap_or_default();
         let history_mm = HISTORY_FACTOR * (offset + gauge).get() + MAX_UNMATCHED_MM;
         Self {
             settings,
@@ -175,10 +173,8 @@ impl DistanceController {
     /// A width of a frame that was captured with the nozzle at `nozzle_path`.
     pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading) -> DistanceTrace {
         self.check_history(nozzle_path.get());
-        let taken = match self.match_speed(nozzle_path.get(), width) {
-            Some(sample) => self.take_sample(sample),
-            None => WidthUse::NotMatched,
-        };
+        let sample = self.match_speed(nozzle_path.get(), width);
+        let taken = sample.map_or(WidthUse::NotMatched, |sample| self.take_sample(sample));
         self.trace(taken)
     }
 
@@ -199,8 +195,8 @@ impl DistanceController {
             return None;
         }
         let laid_s = from.secs()..(from + lasts).secs();
-        let bead = self.pulsation.bead(&laid_s, &self.model.estimate);
-        let ln_speed = (bead.x - width.get().ln()) / bead.y;
+        let [ln_width, exponent] = self.pulsation.bead(&laid_s, &self.model.estimate).into();
+        let ln_speed = (ln_width - width.get().ln()) / exponent;
         let speed = self.settings.reference_speed.get()
             * ln_speed.clamp(-MAX_LN_SPEED_RATIO, MAX_LN_SPEED_RATIO).exp();
         MmPerS::new(speed).ok()
@@ -246,17 +242,22 @@ impl DistanceController {
         self.pulsation.see(&sample.laid_s);
         let ln_width = sample.observation.ln_width - self.pulsation.mean(&sample.laid_s);
         let mut steady = WidthObservation { ln_width, ..sample.observation };
-        if !self.steps.is_under_way() && self.model.estimate.is_known() {
+        if !self.steps.is_under_way && self.model.estimate.is_known() {
             let innovation = self.model.innovation(&steady);
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
         steady.variance *= self.noise.excess();
         let taken = self.update(sample.position_mm, &steady);
+        // A gauge that sees a part of a step shows neither the level before it nor the one after it.
+        if taken == WidthUse::Change {
+            let off = steady.ln_width - steady.predicted(&self.model.estimate.state);
+            sample.observation.variance += off * off;
+        }
         self.pulsation.update(&sample.observation, &sample.laid_s, drift);
         taken
     }
 
-    /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
+    /// Updates the model with a width whose pulsation is subtracted.
     fn update(&mut self, position_mm: f64, observation: &WidthObservation) -> WidthUse {
         if !self.model.estimate.is_known() {
             self.model.update(observation, false);
@@ -271,14 +272,10 @@ impl DistanceController {
             self.model = model;
             return WidthUse::Change;
         }
-        let innovation = self.model.innovation(observation);
-        if innovation.is_outlier() {
-            self.model.update(&observation.weighted_as_no_outlier(&innovation), false);
-            return WidthUse::Outlier;
-        }
-        let informs = self.model.informs_exponent(observation) && !self.pulsation.is_found();
+        let is_outlier = self.model.innovation(observation).is_outlier();
+        let informs = self.model.informs_exponent(observation) && !is_outlier;
         self.model.update(observation, informs);
-        WidthUse::Taken
+        if is_outlier { WidthUse::Outlier } else { WidthUse::Taken }
     }
 
     fn trace(&self, use_of_width: WidthUse) -> DistanceTrace {

@@ -236,7 +236,7 @@ impl Plan {
         Ok(rehearsal.run()?)
     }
 
-    /// A number for each seed from 0 on, in parallel.
+    /// A number for each seed, in parallel.
     pub fn each<T: Send>(
         &self,
         seeds: &Range<u64>,

@@ -6,10 +6,10 @@ use nalgebra::{Matrix4, Vector4};
 const FIRST_SIGMA: f64 = 0.1;
 /// Initial standard deviation of b, as a fraction of it. Exponents of beads range from 0.2 to
 /// 1, so a stated one may be far off.
-const SIGMA: f64 = 0.4;
+const EXPONENT_SIGMA: f64 = 0.4;
 /// Range of b, as factors on its initial value. Too small an exponent makes control too
 /// aggressive, so the lower end is nearer.
-const RANGE: (f64, f64) = (0.7, 2.2);
+const EXPONENT_RANGE: (f64, f64) = (0.7, 2.2);
 /// Largest standard deviation of b at an end of its range, as a fraction of its initial value.
 const SIGMA_AT_RANGE_END: f64 = 0.3;
 /// Variance of a constant exponent: a covariance with it can be inverted. Derived: a standard deviation
@@ -50,10 +50,12 @@ pub struct WiderExponent {
 }
 
 impl BeadEstimate {
-    /// Before the first width. The components that the filter adds are 0 with a variance.
+    /// Before the first width: a variance of 1 says that ln A is not known. The components that the
+    /// filter adds are 0 with a variance.
     pub fn new(prior: Exponent, added: f64) -> Self {
-        let of_b = if prior.learns { (SIGMA * prior.value).powi(2) } else { CONSTANT_VARIANCE };
-        let spread = Vector4::new(FIRST_SIGMA * FIRST_SIGMA, of_b, added, added);
+        let of_b =
+            if prior.learns { (EXPONENT_SIGMA * prior.value).powi(2) } else { CONSTANT_VARIANCE };
+        let spread = Vector4::new(1.0, of_b, added, added);
         Self {
             state: Vector4::new(0.0, prior.value, 0.0, 0.0),
             covariance: Matrix4::from_diagonal(&spread),
@@ -112,7 +114,7 @@ impl BeadEstimate {
     /// exponent is its value.
     pub fn keep_exponent_in_range(&mut self) {
         let Exponent { value, learns } = self.prior;
-        let (min, max) = if learns { RANGE } else { (1.0, 1.0) };
+        let (min, max) = if learns { EXPONENT_RANGE } else { (1.0, 1.0) };
         let within = self.state.y.clamp(min * value, max * value);
         if within != self.state.y {
             let variance = self.covariance.m22;

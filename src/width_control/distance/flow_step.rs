@@ -61,7 +61,8 @@ const SETTLED_GAUGES: f64 = 0.25;
 pub struct StepDetector {
     gauge_mm: f64,
     records: VecDeque<WidthRecord>,
-    is_under_way: bool,
+    /// Whether a step was found that widths still may change.
+    pub is_under_way: bool,
 }
 
 /// A width with the model before it.
@@ -94,11 +95,6 @@ impl StepDetector {
             self.records.pop_front();
         }
         self.records.push_back(WidthRecord { front_mm, observation, before });
-    }
-
-    /// Whether a step was found that widths still may change.
-    pub fn is_under_way(&self) -> bool {
-        self.is_under_way
     }
 
     /// The model after the step that the widths show, if they do; once they no longer show the one that
@@ -140,7 +136,8 @@ impl StepDetector {
         Some(newest.with_estimate(state, to_state * by.covariance * to_state.transpose()))
     }
 
-    /// The likeliest step, if those at all positions are likely enough together, and it is large enough.
+    /// The likeliest step, if those at all positions are likely enough together, and it is large enough. That
+    /// it may be elsewhere is left out of its covariance: the fit is made anew with the next width.
     fn likely_step(
         &self,
         equations: NormalEquations,

@@ -41,9 +41,9 @@ pub struct FlowPulsation {
     hypotheses: Vec<Hypothesis>,
     /// Counts pulses, the unit of the period, where a screw makes them; none where it is seconds.
     counter: Option<PulseCounter>,
-    /// When the last width that was used was laid, in the unit of the period.
+    /// When the last width with a phase was laid, in the unit of the period.
     last: Option<f64>,
-    /// When the newest width was laid, whether it was used or not \[s\].
+    /// When the newest width was laid \[s\].
     seen_s: Option<f64>,
     /// Time over which widths have come, in the unit of the period.
     observed: f64,
@@ -79,8 +79,7 @@ impl FlowPulsation {
 
     /// The extruder reported the speed of its screw.
     pub fn screw_reported(&mut self, at_s: f64, speed: Rpm) {
-        let goes_on = self.counter.as_mut().is_none_or(|counter| counter.report(at_s, speed));
-        if !goes_on {
+        if self.counter.as_mut().is_some_and(|counter| !counter.report(at_s, speed)) {
             self.begin_again();
         }
     }
@@ -94,7 +93,7 @@ impl FlowPulsation {
         }
     }
 
-    /// A width has come, whether it will be used or not. What was learnt of the probabilities fades.
+    /// A width has come, with a phase or without. What was learnt of the probabilities fades.
     /// After a gap, and where no pulse is counted, phases are not known any more.
     pub fn see(&mut self, laid_s: &Range<f64>) {
         let seen = self.seen_s.unwrap_or(laid_s.end);
@@ -104,7 +103,7 @@ impl FlowPulsation {
         }
         self.seen_s = Some(seen + passed_s);
         for one in &mut self.hypotheses {
-            one.log_odds += passed_s / MEMORY_S * (one.prior_log_odds() - one.log_odds);
+            one.log_odds += passed_s / MEMORY_S * (prior_log_odds(&one.bead) - one.log_odds);
         }
     }
 
@@ -147,7 +146,7 @@ impl FlowPulsation {
         let largest = all.fold(f64::NEG_INFINITY, f64::max);
         let mut total = 0.0;
         for one in &mut self.hypotheses {
-            let least = LEAST_LOG_ODDS + one.prior_log_odds();
+            let least = LEAST_LOG_ODDS + prior_log_odds(&one.bead);
             one.log_odds = (one.log_odds - largest).max(least);
             // For speed: smaller ones are too small for any sum.
             one.weight = if one.log_odds > -PRIOR_LOG_ODDS { libm::exp(one.log_odds) } else { 0.0 };
@@ -191,27 +190,25 @@ impl FlowPulsation {
     pub fn period_s(&self) -> Option<f64> {
         let best = self.pulsating().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
         let seconds = self.counter.as_ref().map_or(Some(1.0), PulseCounter::period_s)?;
-        self.is_found().then(|| seconds / best.bead.frequency())
+        self.is_found().then(|| seconds / best.bead.frequency)
     }
 
     /// The hypotheses of a pulsation that count, of which a whole period has passed: a part of one may
     /// be a drift.
     fn pulsating(&self) -> impl Iterator<Item = &Hypothesis> {
-        let has_passed = |one: &Hypothesis| self.observed * one.bead.frequency() > 1.0;
+        let has_passed = |one: &Hypothesis| self.observed * one.bead.frequency > 1.0;
         self.hypotheses.iter().filter(move |one| one.weight > MIN_WEIGHT && has_passed(one))
     }
 }
 
 impl Hypothesis {
     fn new(bead: PulsatingBead) -> Self {
-        let mut new = Self { bead, log_odds: 0.0, weight: 0.0 };
-        new.log_odds = new.prior_log_odds();
-        new
+        Self { bead, log_odds: prior_log_odds(&bead), weight: 0.0 }
     }
+}
 
-    fn prior_log_odds(&self) -> f64 {
-        if self.bead.pulsates() { 0.0 } else { PRIOR_LOG_ODDS }
-    }
+const fn prior_log_odds(bead: &PulsatingBead) -> f64 {
+    if bead.pulsates() { 0.0 } else { PRIOR_LOG_ODDS }
 }
 
 #[cfg(test)]

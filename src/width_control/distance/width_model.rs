@@ -6,8 +6,8 @@ use nalgebra::{Matrix4, Vector4};
 use super::estimate::{BeadEstimate, Exponent, WiderExponent};
 
 /// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
-/// does not move ln A less, but b. An error of the offset with a smaller effect is not learnt: a wave
-/// would be taken for it.
+/// does not move ln A less, but b. Where an error of the offset has a larger effect than this, b is not
+/// learnt.
 const OTHER_SIGMA: f64 = 0.007;
 /// Standard deviation of b after ln v has changed by 1, as a fraction of its initial value: a
 /// bead is a power of its speed only piece by piece. papers.md gives 0.221 and 0.267 on either
@@ -118,28 +118,30 @@ impl WidthModel {
         }
     }
 
-    /// Updates the model with a width. Where `learns` is false b stays, and its uncertainty is considered
-    /// (Schmidt 1966).
+    /// Updates the model with a width; one that is an outlier with so much noise that it just is none. Where
+    /// `learns` is false b stays, and its uncertainty is considered (Schmidt 1966).
     pub fn update(&mut self, observation: &WidthObservation, learns: bool) {
         if !self.estimate.is_known() {
             self.estimate.begin(observation.ln_width, observation.ln_speed);
             return;
         }
-        let innovation = self.innovation(observation);
-        let BeadEstimate { state, covariance, .. } = &self.estimate;
+        let WidthInnovation { by, variance } = self.innovation(observation);
+        let BeadEstimate { state, covariance, prior, .. } = &self.estimate;
+        let spread = variance - observation.variance;
         // The gain is at most one half: a single width may be an outlier.
-        let spread = innovation.variance - observation.variance;
-        let noise = observation.variance.max(spread);
+        let noise = observation.variance.max(spread).max(by * by / OUTLIER_SQUARED - spread);
         let slopes = observation.slopes(state);
         let informed = covariance * slopes;
         let mut gain = informed / (spread + noise);
-        gain.y = if learns && self.estimate.prior.learns {
+        gain.y = if learns && prior.learns {
             informed.y / (spread + noise + OTHER_SIGMA * OTHER_SIGMA)
         } else {
             0.0
         };
-        let covariance = updated_covariance(covariance, &gain, &slopes, noise);
-        *self = self.with_estimate(state + gain * innovation.by, covariance);
+        // Joseph's form, which holds for any gain.
+        let kept = Matrix4::identity() - gain * slopes.transpose();
+        let after = kept * covariance * kept.transpose() + gain * gain.transpose() * noise;
+        *self = self.with_estimate(state + gain * by, 0.5 * (after + after.transpose()));
     }
 
     /// The model with another state.
@@ -172,12 +174,6 @@ impl WidthObservation {
         self.ln_speed + state.z * ahead + state.w * behind
     }
 
-    /// With so large a variance that it is just no outlier.
-    pub fn weighted_as_no_outlier(self, innovation: &WidthInnovation) -> Self {
-        let more = innovation.by * innovation.by / OUTLIER_SQUARED - innovation.variance;
-        Self { variance: self.variance + more.max(0.0), ..self }
-    }
-
     /// ln w that a state predicts.
     pub fn predicted(&self, state: &Vector4<f64>) -> f64 {
         state.x - state.y * self.ln_speed_at(state)
@@ -188,18 +184,6 @@ impl WidthObservation {
         let [ahead, behind] = self.ln_speed_beside;
         Vector4::new(1.0, -self.ln_speed_at(state), -state.y * ahead, -state.y * behind)
     }
-}
-
-/// Covariance after an update with any gain (Joseph form).
-fn updated_covariance(
-    before: &Matrix4<f64>,
-    gain: &Vector4<f64>,
-    slopes: &Vector4<f64>,
-    noise: f64,
-) -> Matrix4<f64> {
-    let kept = Matrix4::identity() - gain * slopes.transpose();
-    let after = kept * before * kept.transpose() + gain * gain.transpose() * noise;
-    0.5 * (after + after.transpose())
 }
 
 #[cfg(test)]

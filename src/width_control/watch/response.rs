@@ -29,6 +29,7 @@ const SLOW_FROM: f64 = 3.0;
 /// ... to. Derived: control by distance follows another bead that is 2 % off target by 0.02 of ln v in
 /// a lag or more, and less than 0.10 need not be noticed.
 const SLOW_TO: f64 = 4.0;
+
 /// A change of the speed without effect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoResponse {

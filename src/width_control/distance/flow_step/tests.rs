@@ -46,7 +46,7 @@ fn last(size: f64, until: f64, is_outlier: impl Fn(u32) -> bool) -> Last {
         detector.push(front, width(ln_width + fraction * size + more), model);
         last = detector.find().map(|found| change(&model, &found));
     }
-    Last { size: last, is_under_way: detector.is_under_way() }
+    Last { size: last, is_under_way: detector.is_under_way }
 }
 
 fn found(size: f64, until: f64) -> f64 {
