@@ -16,6 +16,7 @@
 
 mod estimate;
 mod flow_step;
+mod outlier_run;
 mod pulsating_bead;
 mod pulsation;
 mod pulse_counter;
@@ -25,8 +26,6 @@ mod width_model;
 #[cfg(test)]
 mod tests;
 
-use std::ops::Range;
-
 use serde::{Deserialize, Serialize};
 
 use super::bead_noise::{BeadRoughness, WidthNoise};
@@ -35,12 +34,13 @@ use crate::core::{Mm, MmPerS, Rpm, Span, Stamp};
 
 use estimate::Exponent;
 use flow_step::StepDetector;
+use outlier_run::OutlierRun;
 use pulsation::FlowPulsation;
 pub use pulsation::PERIODS_S;
 pub use pulse_counter::ScrewPulses;
-use sample::MatchedWidth;
 pub use sample::WidthReading;
-use width_model::{BETWEEN_BEADS_SIGMA, WidthModel, WidthObservation};
+use sample::{GaugeInterval, MatchedWidth};
+use width_model::{BETWEEN_BEADS_SIGMA, ExpectedBead, WidthModel, WidthObservation};
 
 /// Settings of control by distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,8 +75,7 @@ pub enum WidthUse {
     /// It updated the model.
     #[default]
     Taken,
-    /// It is 3.5 standard deviations or more from its prediction; it updated the model with so much noise
-    /// that it just is not.
+    /// It is too far from its prediction; several that agree would make a flow change.
     Outlier,
     /// With the widths before it, it shows that the flow has changed, or that it has not, after all.
     Change,
@@ -93,7 +92,7 @@ pub struct DistanceTrace {
     pub level_mm: Mm,
     /// Its standard deviation, given the exponent.
     pub level_sigma_mm: Mm,
-    /// Exponent b of the model; where a pulsation is found, the speed follows that of its hypotheses.
+    /// Exponent b.
     pub exponent: f64,
     /// Period of a pulsation of the flow, where one is detected \[s\].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -118,6 +117,7 @@ pub struct DistanceController {
     model: WidthModel,
     noise: WidthNoise,
     steps: StepDetector,
+    outliers: OutlierRun,
     pulsation: FlowPulsation,
     /// Path of the nozzle at the first of the latest widths without a known speed \[mm\].
     unmatched_since_mm: Option<f64>,
@@ -129,9 +129,7 @@ impl DistanceController {
     /// A controller before the first width.
     pub fn new(settings: DistanceSettings) -> Self {
         let DistanceSettings { offset, gauge, .. } = settings;
-        let exponent = Exponent { value: settings.exponent, learns: settings.learns_exponent };
-        let searched = || FlowPulsation::new(exponent, settings.screw_pulses);
-        let pulsation = settings.cancels_pulsation.then(searched).unwrap_or_default();
+        let exponent = Exponent { prior: settings.exponent, learns: settings.learns_exponent };
         let history_mm = HISTORY_FACTOR * (offset + gauge).get() + MAX_UNMATCHED_MM;
         Self {
             settings,
@@ -139,7 +137,8 @@ impl DistanceController {
             model: WidthModel::new(exponent),
             noise: WidthNoise::new(settings.roughness, gauge.get()),
             steps: StepDetector::new(gauge.get()),
-            pulsation,
+            outliers: OutlierRun::default(),
+            pulsation: FlowPulsation::new(exponent, settings.screw_pulses),
             unmatched_since_mm: None,
             is_unmatched: false,
         }
@@ -149,9 +148,9 @@ impl DistanceController {
     pub fn begin_bead(&mut self) {
         self.speed_history.clear();
         self.steps.clear();
+        self.outliers = OutlierRun::default();
         self.model.begin_bead();
-        let change = BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA;
-        self.pulsation.estimates().for_each(|one| one.shift(0.0, change));
+        self.pulsation.shift(0.0, BETWEEN_BEADS_SIGMA * BETWEEN_BEADS_SIGMA);
         self.noise.begin_bead();
         (self.unmatched_since_mm, self.is_unmatched) = (None, false);
     }
@@ -173,8 +172,10 @@ impl DistanceController {
     /// A width of a frame that was captured with the nozzle at `nozzle_path`.
     pub fn measured(&mut self, nozzle_path: Mm, width: WidthReading) -> DistanceTrace {
         self.check_history(nozzle_path.get());
-        let sample = self.match_speed(nozzle_path.get(), width);
-        let taken = sample.map_or(WidthUse::NotMatched, |sample| self.take_sample(sample));
+        let taken = match self.match_speed(nozzle_path.get(), width) {
+            Some(sample) => self.take_sample(sample),
+            None => WidthUse::NotMatched,
+        };
         self.trace(taken)
     }
 
@@ -195,7 +196,8 @@ impl DistanceController {
             return None;
         }
         let laid_s = from.secs()..(from + lasts).secs();
-        let [ln_width, exponent] = self.pulsation.bead(&laid_s, &self.model.estimate).into();
+        let ExpectedBead { ln_width, exponent } =
+            self.pulsation.bead(&laid_s, self.model.expected());
         let ln_speed = (ln_width - width.get().ln()) / exponent;
         let speed = self.settings.reference_speed.get()
             * ln_speed.clamp(-MAX_LN_SPEED_RATIO, MAX_LN_SPEED_RATIO).exp();
@@ -205,8 +207,8 @@ impl DistanceController {
     /// Notices when widths cannot be matched to speeds for longer than the start of a bead
     /// takes to come under the camera.
     fn check_history(&mut self, nozzle_path: f64) {
-        let gauge_mm = self.gauge_mm(nozzle_path);
-        if self.speed_history.mean_over(gauge_mm.start, gauge_mm.end).is_some() {
+        let (position, half) = (self.gauge_centre(nozzle_path), 0.5 * self.settings.gauge.get());
+        if self.speed_history.mean_over(position - half, position + half).is_some() {
             self.unmatched_since_mm = None;
             return;
         }
@@ -215,49 +217,55 @@ impl DistanceController {
         self.is_unmatched |= nozzle_path - since > limit;
     }
 
-    /// The gauge along the path \[mm\].
-    fn gauge_mm(&self, nozzle_path: f64) -> Range<f64> {
-        let (centre, half) =
-            (nozzle_path - self.settings.offset.get(), 0.5 * self.settings.gauge.get());
-        centre - half..centre + half
+    /// Middle of the gauge along the path \[mm\].
+    fn gauge_centre(&self, nozzle_path: f64) -> f64 {
+        nozzle_path - self.settings.offset.get()
     }
 
     fn match_speed(&self, nozzle_path: f64, reading: WidthReading) -> Option<MatchedWidth> {
-        if reading.width <= Mm::ZERO {
+        if reading.width <= Mm::ZERO || self.speed_history.is_empty() {
             return None;
         }
-        let tolerance_mm = OFFSET_SIGMAS * self.settings.offset_sigma.get();
-        let (gauge_mm, exponent) = (self.gauge_mm(nozzle_path), self.model.estimate.exponent());
-        MatchedWidth::new(&self.speed_history, &gauge_mm, tolerance_mm, reading, exponent)
+        let gauge = GaugeInterval {
+            centre_mm: self.gauge_centre(nozzle_path),
+            length_mm: self.settings.gauge.get(),
+            centre_tolerance_mm: OFFSET_SIGMAS * self.settings.offset_sigma.get(),
+        };
+        MatchedWidth::new(&self.speed_history, gauge, reading, self.model.estimate.exponent())
     }
 
     fn take_sample(&mut self, mut sample: MatchedWidth) -> WidthUse {
-        let spacing = self.model.advance_to(sample.position_mm);
-        let drift = self.settings.drift_per_root_m.powi(2) / 1e3 * spacing;
+        let spacing = self.model.distance_to(sample.position_mm);
+        let drift = self.drift_per_mm() * spacing;
         sample.observation.variance += self.noise.variance(spacing);
-        self.model.estimate.shift(0.0, drift);
+        self.model.advance_to(sample.position_mm, drift);
         if let Some(wider) = self.model.move_to(sample.observation.ln_speed) {
-            self.pulsation.estimates().for_each(|one| one.widen_exponent(&wider));
+            self.pulsation.widen_exponent(&wider);
         }
-        self.pulsation.see(&sample.laid_s);
+        if self.settings.cancels_pulsation {
+            self.pulsation.see(&sample.laid_s);
+        }
+        if self.pulsation.is_found() {
+            let expected = self.pulsation.bead(&sample.laid_s, self.model.expected());
+            self.model.take_exponent(expected.exponent, sample.observation.ln_speed);
+        }
         let ln_width = sample.observation.ln_width - self.pulsation.mean(&sample.laid_s);
         let mut steady = WidthObservation { ln_width, ..sample.observation };
-        if !self.steps.is_under_way && self.model.estimate.is_known() {
+        if !self.steps.is_under_way() && self.model.estimate.is_known() {
             let innovation = self.model.innovation(&steady);
             self.noise.observe(innovation.normalised(), sample.position_mm);
         }
         steady.variance *= self.noise.excess();
         let taken = self.update(sample.position_mm, &steady);
-        // A gauge that sees a part of a step shows neither the level before it nor the one after it.
-        if taken == WidthUse::Change {
-            let off = steady.ln_width - steady.predicted(&self.model.estimate.state);
-            sample.observation.variance += off * off;
+        // Outliers and widths within a step say nothing of a pulsation.
+        let is_used = !matches!(taken, WidthUse::Change | WidthUse::Outlier);
+        if is_used && self.settings.cancels_pulsation {
+            self.pulsation.update(&sample.observation, &sample.laid_s, drift);
         }
-        self.pulsation.update(&sample.observation, &sample.laid_s, drift);
         taken
     }
 
-    /// Updates the model with a width whose pulsation is subtracted.
+    /// Updates the model with a width whose pulsation is subtracted, or rejects the width.
     fn update(&mut self, position_mm: f64, observation: &WidthObservation) -> WidthUse {
         if !self.model.estimate.is_known() {
             self.model.update(observation, false);
@@ -268,14 +276,27 @@ impl DistanceController {
         if let Some(model) = self.steps.find() {
             let predicted = |model: &WidthModel| observation.predicted(&model.estimate.state);
             let change = predicted(&model) - predicted(&self.model);
-            self.pulsation.estimates().for_each(|one| one.shift(change, change * change));
+            self.pulsation.shift(change, change * change);
             self.model = model;
+            self.outliers = OutlierRun::default();
             return WidthUse::Change;
         }
-        let is_outlier = self.model.innovation(observation).is_outlier();
-        let informs = self.model.informs_exponent(observation) && !is_outlier;
+        let innovation = self.model.innovation(observation);
+        if innovation.is_outlier() {
+            if !self.outliers.agree(innovation, front, self.settings.gauge.get()) {
+                return WidthUse::Outlier;
+            }
+            self.model.update(&observation.weighted_as_no_outlier(&innovation), false);
+            return WidthUse::Taken;
+        }
+        self.outliers = OutlierRun::default();
+        let informs = self.model.informs_exponent(observation) && !self.pulsation.is_found();
         self.model.update(observation, informs);
-        if is_outlier { WidthUse::Outlier } else { WidthUse::Taken }
+        WidthUse::Taken
+    }
+
+    fn drift_per_mm(&self) -> f64 {
+        self.settings.drift_per_root_m.powi(2) / 1e3
     }
 
     fn trace(&self, use_of_width: WidthUse) -> DistanceTrace {

@@ -89,6 +89,11 @@ impl SpeedHistory {
         self.early_s = 0.0;
     }
 
+    /// Whether there is no segment yet.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.len() < 2
+    }
+
     /// Adds a report: time \[s\], path \[mm\], speed \[mm/s\] and the flow over the one at the
     /// start speed. A path that falls, a time that does not grow, or a silence in which the speed may
     /// have changed more than once, clears the history. Returns whether it goes on.
@@ -319,7 +324,7 @@ mod tests {
     fn a_path_that_falls_clears_the_history() {
         let mut history = stepped(100.0, 50.0);
         history.report(10.0, 0.0, 80.0, 1.0);
-        assert!(history.nodes.len() < 2);
+        assert!(history.is_empty());
         history.report(10.1, 8.0, 80.0, 1.0);
         assert!((history.mean_over(0.0, 8.0).unwrap().mean - 0.8_f64.ln()).abs() < 1e-9);
     }
@@ -331,7 +336,7 @@ mod tests {
         history.report(3.9 + 0.4, end + 20.0, 50.0, 1.0);
         assert!(history.mean_over(end, end + 20.0).is_some());
         history.report(4.3 + 0.8, end + 70.0, 50.0, 1.0);
-        assert!(history.nodes.len() < 2);
+        assert!(history.is_empty());
     }
 
     #[test]

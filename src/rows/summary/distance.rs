@@ -10,9 +10,9 @@ use crate::width_control::{DistanceTrace, FallbackReason};
 /// Number of widths by their use, and the last estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DistanceSummary {
-    /// Widths that were as predicted.
+    /// Widths that were used.
     pub samples_used: u64,
-    /// Widths that were too far from their prediction, and counted the less.
+    /// Widths that were rejected as outliers.
     pub outliers: u64,
     /// Detected changes of the flow.
     pub changes: u64,

@@ -23,7 +23,7 @@ const MIN_LN_SPEED_DIFFERENCE: f64 = 0.015;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exponent {
     /// Its value.
-    pub value: f64,
+    pub prior: f64,
     /// Whether it is estimated from the widths.
     pub learns: bool,
 }
@@ -35,8 +35,7 @@ pub struct BeadEstimate {
     pub state: Vector4<f64>,
     /// Their covariance.
     pub covariance: Matrix4<f64>,
-    /// What the cell states of b.
-    pub prior: Exponent,
+    exponent: Exponent,
     is_known: bool,
 }
 
@@ -52,14 +51,17 @@ pub struct WiderExponent {
 impl BeadEstimate {
     /// Before the first width: a variance of 1 says that ln A is not known. The components that the
     /// filter adds are 0 with a variance.
-    pub fn new(prior: Exponent, added: f64) -> Self {
-        let of_b =
-            if prior.learns { (EXPONENT_SIGMA * prior.value).powi(2) } else { CONSTANT_VARIANCE };
+    pub fn new(exponent: Exponent, added: f64) -> Self {
+        let of_b = if exponent.learns {
+            (EXPONENT_SIGMA * exponent.prior).powi(2)
+        } else {
+            CONSTANT_VARIANCE
+        };
         let spread = Vector4::new(1.0, of_b, added, added);
         Self {
-            state: Vector4::new(0.0, prior.value, 0.0, 0.0),
+            state: Vector4::new(0.0, exponent.prior, 0.0, 0.0),
             covariance: Matrix4::from_diagonal(&spread),
-            prior,
+            exponent,
             is_known: false,
         }
     }
@@ -113,16 +115,16 @@ impl BeadEstimate {
     /// Clamps b to its range, and moves the others along the correlation. The range of a constant
     /// exponent is its value.
     pub fn keep_exponent_in_range(&mut self) {
-        let Exponent { value, learns } = self.prior;
+        let Exponent { prior, learns } = self.exponent;
         let (min, max) = if learns { EXPONENT_RANGE } else { (1.0, 1.0) };
-        let within = self.state.y.clamp(min * value, max * value);
+        let within = self.state.y.clamp(min * prior, max * prior);
         if within != self.state.y {
             let variance = self.covariance.m22;
             let slopes = self.covariance.column(1) / variance;
             self.state += slopes * (within - self.state.y);
             self.state.y = within;
             self.covariance -= slopes * slopes.transpose() * variance;
-            self.covariance.m22 = variance.min((SIGMA_AT_RANGE_END * value).powi(2));
+            self.covariance.m22 = variance.min((SIGMA_AT_RANGE_END * prior).powi(2));
         }
     }
 }

@@ -7,7 +7,6 @@
 //! see a step neither waits for the rest nor takes what it sees for all of it.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 
 use nalgebra::{Matrix4x5, Matrix5, Vector4, Vector5};
 
@@ -45,10 +44,10 @@ const MAX_OUTLIER_RATIO: f64 = 0.34;
 /// Misfit of an outlier, as a negative log likelihood. Derived: half the normalised innovation
 /// squared from which a width is one in the model.
 const OUTLIER_MISFIT: f64 = 6.125;
-/// Largest length of a piece of path in which one step is tried, in gauges.
-const MAX_PIECE_GAUGES: f64 = 0.1;
-/// Largest number of them between two widths.
-const MAX_PIECES: usize = 10;
+/// Largest distance between positions that are tried, in gauges.
+const MAX_SPACING_GAUGES: f64 = 0.1;
+/// Largest number of positions between two widths.
+const MAX_POSITIONS: usize = 10;
 /// Smallest prior of a position: widths of a robot that hardly moves.
 const MIN_PRIOR: f64 = 1e-6;
 /// Shortest gauge \[mm\]: a width at a point, as of a plant without a camera, counts as one.
@@ -61,8 +60,7 @@ const SETTLED_GAUGES: f64 = 0.25;
 pub struct StepDetector {
     gauge_mm: f64,
     records: VecDeque<WidthRecord>,
-    /// Whether a step was found that widths still may change.
-    pub is_under_way: bool,
+    is_under_way: bool,
 }
 
 /// A width with the model before it.
@@ -97,6 +95,18 @@ impl StepDetector {
         self.records.push_back(WidthRecord { front_mm, observation, before });
     }
 
+    /// Whether there are as many widths as are kept.
+    fn is_full(&self) -> bool {
+        let ends = self.records.back().zip(self.records.front());
+        let length_mm = ends.map_or(0.0, |(last, first)| last.front_mm - first.front_mm);
+        self.records.len() == MAX_WIDTHS || length_mm > KEPT_GAUGES * self.gauge_mm
+    }
+
+    /// Whether a step was found that widths still may change.
+    pub fn is_under_way(&self) -> bool {
+        self.is_under_way
+    }
+
     /// The model after the step that the widths show, if they do; once they no longer show the one that
     /// was under way, the model without it.
     pub fn find(&mut self) -> Option<WidthModel> {
@@ -114,14 +124,14 @@ impl StepDetector {
         let found = self.likely_step(equations, &widths, &without_step);
         let Some(step) = found else {
             let was_under_way = std::mem::take(&mut self.is_under_way);
-            let model = || self.model_after(&without_step, Matrix4x5::identity());
+            let model = || self.model_after(&without_step.correction, Matrix4x5::identity());
             return was_under_way.then(model).flatten();
         };
         self.is_under_way = true;
         // The size of the step is a change of ln A.
         let mut to_state = Matrix4x5::identity();
         to_state.m15 = 1.0;
-        let model = self.model_after(&step.fit, to_state)?;
+        let model = self.model_after(&step.correction, to_state)?;
         let settled_mm = step.position_mm + self.gauge_mm * (1.0 + SETTLED_GAUGES);
         if self.records.back()?.front_mm > settled_mm {
             self.clear();
@@ -129,30 +139,30 @@ impl StepDetector {
         Some(model)
     }
 
-    /// The newest model, with the state to which a fit leads, and its covariance.
-    fn model_after(&self, by: &Fit, to_state: Matrix4x5<f64>) -> Option<WidthModel> {
+    /// The newest model, with the state to which a correction leads, and its covariance.
+    fn model_after(&self, by: &Correction, to_state: Matrix4x5<f64>) -> Option<WidthModel> {
         let (base, newest) = (self.records.front()?.before, self.records.back()?.before);
         let state = base.estimate.state + to_state * by.change;
         Some(newest.with_estimate(state, to_state * by.covariance * to_state.transpose()))
     }
 
-    /// The likeliest step, if those at all positions are likely enough together, and it is large enough. That
-    /// it may be elsewhere is left out of its covariance: the fit is made anew with the next width.
+    /// The mean of the steps at all positions, if together they are likely enough, and large enough.
     fn likely_step(
         &self,
         equations: NormalEquations,
         widths: &[SeenWidth],
         without_step: &Fit,
-    ) -> Option<Step> {
-        let steps: Vec<Step> =
-            self.pieces().filter_map(|piece| self.with_step(equations, widths, piece)).collect();
-        let likeliest =
-            *steps.iter().max_by(|a, b| a.fit.ln_evidence.total_cmp(&b.fit.ln_evidence))?;
-        let evidence = |one: &Step| libm::exp(one.fit.ln_evidence - likeliest.fit.ln_evidence);
-        let total = likeliest.fit.ln_evidence + libm::log(steps.iter().map(evidence).sum());
-        let is_likely = total - without_step.ln_evidence >= MIN_LOG_ODDS;
-        let is_large = likeliest.fit.change[STEP].abs() > MIN_SIZE;
-        (is_likely && (self.is_under_way || is_large)).then_some(likeliest)
+    ) -> Option<LikelyStep> {
+        let candidates: Vec<Candidate> =
+            self.positions().filter_map(|at| self.with_step(equations, widths, at)).collect();
+        let evidence = candidates.iter().map(|one| one.fit.ln_evidence);
+        let largest = evidence.clone().reduce(f64::max)?;
+        let total: f64 = evidence.map(|one| libm::exp(one - largest)).sum();
+        if largest + libm::log(total) - without_step.ln_evidence < MIN_LOG_ODDS {
+            return None;
+        }
+        let step = LikelyStep::mean_of(&candidates, largest, total);
+        (self.is_under_way || step.correction.change[STEP].abs() > MIN_SIZE).then_some(step)
     }
 
     /// All widths, without a step, less what a state predicts.
@@ -168,59 +178,86 @@ impl StepDetector {
     /// Whether there are as many widths as are kept, and most of them were outliers: a change came faster
     /// than a gauge sees a step, and the model has not followed it.
     fn has_missed_one(&self) -> bool {
-        let ends = self.records.back().zip(self.records.front());
-        let length_mm = ends.map_or(0.0, |(last, first)| last.front_mm - first.front_mm);
-        let is_full = self.records.len() == MAX_WIDTHS || length_mm > KEPT_GAUGES * self.gauge_mm;
         let was_outlier =
             |record: &&WidthRecord| record.before.innovation(&record.observation).is_outlier();
-        is_full && 2 * self.records.iter().filter(was_outlier).count() > self.records.len()
+        self.is_full() && 2 * self.records.iter().filter(was_outlier).count() > self.records.len()
     }
 
-    /// Pieces of path between the ends of the gauges of successive widths, where a step is as likely
-    /// anywhere; where one was missed, a gauge before them too. The step in the middle of a piece
-    /// counts for all in it.
-    fn pieces(&self) -> impl Iterator<Item = Range<f64>> {
+    /// Positions to try between the ends of the gauges of successive widths, where a step is as likely
+    /// anywhere. Where one was missed, a position before them too, as likely as all within one gauge.
+    fn positions(&self) -> impl Iterator<Item = Position> {
+        let first = self.records.front().filter(|_| self.has_missed_one());
+        let before_all =
+            first.map(|record| Position { at_mm: record.front_mm - self.gauge_mm, log_prior: 0.0 });
+        let between = |last_mm: f64, next_mm: f64| {
+            let apart = (next_mm - last_mm) / (MAX_SPACING_GAUGES * self.gauge_mm);
+            let pieces = to_count(apart.ceil()).clamp(1, MAX_POSITIONS);
+            let length = (next_mm - last_mm) / to_f64(pieces);
+            let log_prior = libm::log((length / self.gauge_mm).max(MIN_PRIOR));
+            let middle = move |piece| last_mm + (to_f64(piece) + 0.5) * length;
+            (0..pieces).map(move |piece| Position { at_mm: middle(piece), log_prior })
+        };
         let fronts = self.records.iter().map(|record| record.front_mm);
-        let missed = fronts.clone().next().filter(|_| self.has_missed_one());
-        let before_all = |first: f64| first - 1.5 * self.gauge_mm..first - 0.5 * self.gauge_mm;
-        let within = fronts.clone().zip(fronts.skip(1)).flat_map(|(last, next)| {
-            let count = to_count(((next - last) / (MAX_PIECE_GAUGES * self.gauge_mm)).ceil());
-            let count = count.clamp(1, MAX_PIECES);
-            let at = move |number| last + (next - last) * to_f64(number) / to_f64(count);
-            (0..count).map(move |number| at(number)..at(number + 1))
-        });
-        missed.map(before_all).into_iter().chain(within)
+        let within = fronts.clone().zip(fronts.skip(1));
+        before_all.into_iter().chain(within.flat_map(move |(last, next)| between(last, next)))
     }
 
-    /// A step in the middle of a piece of path \[mm\], if enough widths show it.
     fn with_step(
         &self,
         mut equations: NormalEquations,
         widths: &[SeenWidth],
-        piece_mm: Range<f64>,
-    ) -> Option<Step> {
-        let position_mm = 0.5 * (piece_mm.start + piece_mm.end);
-        let after_step = |front_mm: f64| (front_mm - position_mm) / self.gauge_mm;
+        position: Position,
+    ) -> Option<Candidate> {
+        let after_step = |front_mm: f64| (front_mm - position.at_mm) / self.gauge_mm;
         let mut widths = widths.to_vec();
         for (one, record) in widths.iter_mut().zip(&self.records) {
             one.slopes[STEP] = after_step(record.front_mm).clamp(0.0, 1.0);
             equations.add_step(one);
         }
         let after = widths.iter().filter(|one| one.shows_step()).count();
-        let mut fit = equations.fit(widths)?;
+        let fit = equations.fit(widths)?;
         let most = to_count(MAX_OUTLIER_RATIO * to_f64(after));
-        let prior = (piece_mm.end - piece_mm.start) / self.gauge_mm;
-        fit.ln_evidence += libm::log(prior.max(MIN_PRIOR));
-        (fit.after >= MIN_WIDTHS.max(after - most)).then_some(Step { position_mm, fit })
+        let ln_evidence = fit.ln_evidence + position.log_prior;
+        let candidate = Candidate { position_mm: position.at_mm, fit: Fit { ln_evidence, ..fit } };
+        (fit.after >= MIN_WIDTHS.max(after - most)).then_some(candidate)
     }
+}
+
+/// A position at which the flow may have stepped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Position {
+    at_mm: f64,
+    log_prior: f64,
 }
 
 /// A step at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Step {
+struct Candidate {
     position_mm: f64,
-    /// Its evidence is that with its prior.
     fit: Fit,
+}
+
+/// The mean of the steps at all positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LikelyStep {
+    position_mm: f64,
+    correction: Correction,
+}
+
+impl LikelyStep {
+    /// Of candidates, weighted by their evidence. `total` is the sum of it over that of the likeliest.
+    fn mean_of(candidates: &[Candidate], likeliest: f64, total: f64) -> Self {
+        let weight = |one: &Candidate| libm::exp(one.fit.ln_evidence - likeliest) / total;
+        let position_mm = candidates.iter().map(|one| weight(one) * one.position_mm).sum();
+        let by = |one: &Candidate| one.fit.correction;
+        let change: Vector5<f64> = candidates.iter().map(|one| weight(one) * by(one).change).sum();
+        let spread = |one: &Candidate| {
+            let off = by(one).change - change;
+            weight(one) * (by(one).covariance + off * off.transpose())
+        };
+        let covariance = candidates.iter().map(spread).sum();
+        Self { position_mm, correction: Correction { change, covariance } }
+    }
 }
 
 /// A width less its prediction by the model before all of them.
@@ -248,14 +285,20 @@ impl SeenWidth {
     }
 }
 
-/// Component of a [`Fit`] that is the size of the step.
+/// Component of a [`Correction`] that is the size of the step.
 const STEP: usize = 4;
 
-/// What fits the widths: errors of ln A, of b and of the offset, and the size of the step.
+/// Errors of ln A, of b and of the offset, and the size of the step, with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Fit {
+struct Correction {
     change: Vector5<f64>,
     covariance: Matrix5<f64>,
+}
+
+/// The correction that fits the widths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Fit {
+    correction: Correction,
     /// Logarithm of its evidence, without a constant.
     ln_evidence: f64,
     /// Number of widths that show some of the step and are no outliers.
@@ -311,7 +354,8 @@ impl NormalEquations {
                 let explained = 0.5 * self.weighted.dot(&change);
                 let ln_evidence = explained - self.misfit - 0.5 * cholesky.ln_determinant();
                 let after = widths.iter().filter(|one| one.shows_step()).count();
-                return Some(Fit { change, covariance: cholesky.inverse(), ln_evidence, after });
+                let correction = Correction { change, covariance: cholesky.inverse() };
+                return Some(Fit { correction, ln_evidence, after });
             };
             self.add(&widths.swap_remove(worst), -1.0);
             self.misfit += OUTLIER_MISFIT;

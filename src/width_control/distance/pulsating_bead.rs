@@ -47,10 +47,10 @@ impl Phases {
 /// State: ln A, b, and the components of the harmonic at phase 0 and a quarter of a period later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulsatingBead {
-    /// Its frequency; 0 without a pulsation.
-    pub frequency: f64,
+    rad_per_unit: f64,
     /// Its drift over the stated one, as a variance.
     drift_ratio: f64,
+    exponent: Exponent,
     /// What is known of it.
     pub estimate: BeadEstimate,
 }
@@ -60,30 +60,40 @@ impl PulsatingBead {
     /// stated, as a variance.
     pub fn new(frequency: f64, drift_ratio: f64, exponent: Exponent) -> Self {
         let part = if frequency > 0.0 { AMPLITUDE_SIGMA * AMPLITUDE_SIGMA } else { 0.0 };
-        Self { frequency, drift_ratio, estimate: BeadEstimate::new(exponent, part) }
+        Self {
+            rad_per_unit: TAU * frequency,
+            drift_ratio,
+            exponent,
+            estimate: BeadEstimate::new(exponent, part),
+        }
     }
 
     /// Before the first width of a bead: of all that was known, b remains.
     pub fn begin_again(&mut self) {
         let before = self.estimate;
-        *self = Self::new(self.frequency, self.drift_ratio, before.prior);
+        *self = Self::new(self.frequency(), self.drift_ratio, self.exponent);
         self.estimate.state.y = before.state.y;
         self.estimate.covariance.m22 = before.covariance.m22;
     }
 
     /// Whether it has a pulsation.
-    pub const fn pulsates(&self) -> bool {
-        self.frequency > 0.0
+    pub fn pulsates(&self) -> bool {
+        self.rad_per_unit > 0.0
+    }
+
+    /// Its frequency.
+    pub fn frequency(&self) -> f64 {
+        self.rad_per_unit / TAU
     }
 
     /// The phases of its harmonic at the ends of a time.
     pub fn phases(&self, over: &Range<f64>) -> Phases {
         let lasted = (over.end - over.start).max(MIN_LASTED);
         let at = |time: f64| {
-            let (sin, cos) = libm::sincos(TAU * self.frequency * time);
+            let (sin, cos) = libm::sincos(self.rad_per_unit * time);
             Complex::new(cos, sin)
         };
-        let turned = TAU * self.frequency * lasted;
+        let turned = self.rad_per_unit * lasted;
         Phases { start: at(over.start), end: at(over.start + lasted), turned }
     }
 
@@ -102,14 +112,9 @@ impl PulsatingBead {
             return 0.0;
         }
         let harmonic = phases.mean();
-        let part = DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * TAU * self.frequency * passed;
-        let drifts = Vector4::new(drift * self.drift_ratio, 0.0, part, part);
-        let covariance = self.estimate.covariance + Matrix4::from_diagonal(&drifts);
+        let covariance = self.drifted(passed, drift);
         let predicts = Vector4::new(1.0, -ln_speed, harmonic.x, harmonic.y);
-        // Near the speed at which the width is known best, it says nothing of b.
-        let says = self.estimate.shows_exponent(ln_speed);
-        let informing_speed = if says { ln_speed } else { self.estimate.best_known() };
-        let informs = Vector4::new(1.0, -informing_speed, harmonic.x, harmonic.y);
+        let informs = Vector4::new(1.0, -self.informing_speed(ln_speed), harmonic.x, harmonic.y);
         let informed = covariance * informs;
         let total = informs.dot(&informed).max(0.0) + variance;
         let by = ln_width - predicts.dot(&self.estimate.state);
@@ -120,6 +125,20 @@ impl PulsatingBead {
         self.estimate.covariance = covariance - gain * informed.transpose();
         self.estimate.keep_exponent_in_range();
         -0.5 * (squared.min(MAX_SQUARED_INNOVATION) + ln(total))
+    }
+
+    /// ln(v/v₀) by which a width informs b: near the speed at which the width is known best, that
+    /// speed, which says nothing of b.
+    fn informing_speed(&self, ln_speed: f64) -> f64 {
+        let estimate = &self.estimate;
+        if estimate.shows_exponent(ln_speed) { ln_speed } else { estimate.best_known() }
+    }
+
+    /// The covariance after a time in which ln A has drifted by a variance.
+    fn drifted(&self, passed: f64, drift: f64) -> Matrix4<f64> {
+        let part = DRIFT_PER_ROOT_RAD * DRIFT_PER_ROOT_RAD * self.rad_per_unit * passed;
+        let drifts = Vector4::new(drift * self.drift_ratio, 0.0, part, part);
+        self.estimate.covariance + Matrix4::from_diagonal(&drifts)
     }
 
     /// The pulsation of ln w in its mean over a time.
@@ -144,7 +163,7 @@ mod tests {
     use super::*;
     use crate::sim::hash;
 
-    const EXPONENT: Exponent = Exponent { value: 0.25, learns: true };
+    const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
 
     fn width(ln_width: f64, ln_speed: f64) -> WidthObservation {
         WidthObservation { ln_width, ln_speed, ln_speed_beside: [0.0; 2], variance: 1e-6 }
@@ -209,11 +228,11 @@ mod tests {
             add(&mut bead, at, &width(3.7 + 0.001 * width_noise, 0.002 * speed_noise));
         }
         assert!(
-            (bead.estimate.exponent() - EXPONENT.value).abs() < 0.01,
+            (bead.estimate.exponent() - EXPONENT.prior).abs() < 0.01,
             "{}",
             bead.estimate.exponent()
         );
-        assert!(bead.estimate.covariance.m22 > 0.8 * (0.4 * EXPONENT.value).powi(2));
+        assert!(bead.estimate.covariance.m22 > 0.8 * (0.4 * EXPONENT.prior).powi(2));
     }
 
     #[test]

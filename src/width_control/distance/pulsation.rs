@@ -4,12 +4,10 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector2;
-
-use super::estimate::{BeadEstimate, Exponent};
+use super::estimate::{Exponent, WiderExponent};
 use super::pulsating_bead::{Phases, PulsatingBead};
 use super::pulse_counter::{PulseCounter, ScrewPulses};
-use super::width_model::WidthObservation;
+use super::width_model::{ExpectedBead, WidthObservation};
 use crate::core::Rpm;
 
 /// Shortest and longest period \[s\]. Shorter ones are blurred by the gauge; longer ones are
@@ -35,15 +33,15 @@ const MIN_WEIGHT: f64 = 1e-3;
 /// Longest time between two widths over which phases are kept \[s\].
 const LONGEST_GAP_S: f64 = 3.0;
 
-/// Hypotheses of all frequencies, and of none. Without any a pulsation is not looked for.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// Hypotheses of all frequencies, and of none.
+#[derive(Debug, Clone, PartialEq)]
 pub struct FlowPulsation {
     hypotheses: Vec<Hypothesis>,
     /// Counts pulses, the unit of the period, where a screw makes them; none where it is seconds.
     counter: Option<PulseCounter>,
-    /// When the last width with a phase was laid, in the unit of the period.
+    /// When the last width that was used was laid, in the unit of the period.
     last: Option<f64>,
-    /// When the newest width was laid \[s\].
+    /// When the newest width was laid, whether it was used or not \[s\].
     seen_s: Option<f64>,
     /// Time over which widths have come, in the unit of the period.
     observed: f64,
@@ -79,7 +77,8 @@ impl FlowPulsation {
 
     /// The extruder reported the speed of its screw.
     pub fn screw_reported(&mut self, at_s: f64, speed: Rpm) {
-        if self.counter.as_mut().is_some_and(|counter| !counter.report(at_s, speed)) {
+        let goes_on = self.counter.as_mut().is_none_or(|counter| counter.report(at_s, speed));
+        if !goes_on {
             self.begin_again();
         }
     }
@@ -93,7 +92,7 @@ impl FlowPulsation {
         }
     }
 
-    /// A width has come, with a phase or without. What was learnt of the probabilities fades.
+    /// A width has come, whether it will be used or not. What was learnt of the probabilities fades.
     /// After a gap, and where no pulse is counted, phases are not known any more.
     pub fn see(&mut self, laid_s: &Range<f64>) {
         let seen = self.seen_s.unwrap_or(laid_s.end);
@@ -103,7 +102,7 @@ impl FlowPulsation {
         }
         self.seen_s = Some(seen + passed_s);
         for one in &mut self.hypotheses {
-            one.log_odds += passed_s / MEMORY_S * (prior_log_odds(&one.bead) - one.log_odds);
+            one.log_odds += passed_s / MEMORY_S * (one.prior_log_odds() - one.log_odds);
         }
     }
 
@@ -146,7 +145,7 @@ impl FlowPulsation {
         let largest = all.fold(f64::NEG_INFINITY, f64::max);
         let mut total = 0.0;
         for one in &mut self.hypotheses {
-            let least = LEAST_LOG_ODDS + prior_log_odds(&one.bead);
+            let least = LEAST_LOG_ODDS + one.prior_log_odds();
             one.log_odds = (one.log_odds - largest).max(least);
             // For speed: smaller ones are too small for any sum.
             one.weight = if one.log_odds > -PRIOR_LOG_ODDS { libm::exp(one.log_odds) } else { 0.0 };
@@ -157,20 +156,29 @@ impl FlowPulsation {
         }
     }
 
-    /// The estimates of all hypotheses.
-    pub fn estimates(&mut self) -> impl Iterator<Item = &mut BeadEstimate> {
-        self.hypotheses.iter_mut().map(|one| &mut one.bead.estimate)
+    /// ln A of every hypothesis has changed, and is less certain by a variance.
+    pub fn shift(&mut self, by: f64, variance: f64) {
+        for one in &mut self.hypotheses {
+            one.bead.estimate.shift(by, variance);
+        }
     }
 
-    /// ln A and b of the bead that is laid over a time \[s\]: the mean of all hypotheses. Without a
-    /// pulsation it is as `steady` says.
-    pub fn bead(&self, laid_s: &Range<f64>, steady: &BeadEstimate) -> Vector2<f64> {
-        let steady = steady.state.xy();
+    /// b of every hypothesis is less certain.
+    pub fn widen_exponent(&mut self, by: &WiderExponent) {
+        for one in &mut self.hypotheses {
+            one.bead.estimate.widen_exponent(by);
+        }
+    }
+
+    /// The bead that is laid over a time \[s\]: the mean of all hypotheses. Without a pulsation it is as
+    /// `steady` says.
+    pub fn bead(&self, laid_s: &Range<f64>, steady: ExpectedBead) -> ExpectedBead {
         let mut expected = steady;
         let Some(laid) = self.phases(laid_s) else { return steady };
         for Hypothesis { bead, weight, .. } in self.pulsating() {
-            let pulsation = Vector2::new(bead.mean(&laid), 0.0);
-            expected += (bead.estimate.state.xy() + pulsation - steady) * *weight;
+            expected.ln_width +=
+                weight * (bead.estimate.ln_width() + bead.mean(&laid) - steady.ln_width);
+            expected.exponent += weight * (bead.estimate.exponent() - steady.exponent);
         }
         expected
     }
@@ -190,25 +198,27 @@ impl FlowPulsation {
     pub fn period_s(&self) -> Option<f64> {
         let best = self.pulsating().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
         let seconds = self.counter.as_ref().map_or(Some(1.0), PulseCounter::period_s)?;
-        self.is_found().then(|| seconds / best.bead.frequency)
+        self.is_found().then(|| seconds / best.bead.frequency())
     }
 
     /// The hypotheses of a pulsation that count, of which a whole period has passed: a part of one may
     /// be a drift.
     fn pulsating(&self) -> impl Iterator<Item = &Hypothesis> {
-        let has_passed = |one: &Hypothesis| self.observed * one.bead.frequency > 1.0;
+        let has_passed = |one: &Hypothesis| self.observed * one.bead.frequency() > 1.0;
         self.hypotheses.iter().filter(move |one| one.weight > MIN_WEIGHT && has_passed(one))
     }
 }
 
 impl Hypothesis {
     fn new(bead: PulsatingBead) -> Self {
-        Self { bead, log_odds: prior_log_odds(&bead), weight: 0.0 }
+        let mut new = Self { bead, log_odds: 0.0, weight: 0.0 };
+        new.log_odds = new.prior_log_odds();
+        new
     }
-}
 
-const fn prior_log_odds(bead: &PulsatingBead) -> f64 {
-    if bead.pulsates() { 0.0 } else { PRIOR_LOG_ODDS }
+    fn prior_log_odds(&self) -> f64 {
+        if self.bead.pulsates() { 0.0 } else { PRIOR_LOG_ODDS }
+    }
 }
 
 #[cfg(test)]
@@ -218,7 +228,7 @@ mod tests {
     use super::*;
     use crate::sim::hash;
 
-    const EXPONENT: Exponent = Exponent { value: 0.25, learns: true };
+    const EXPONENT: Exponent = Exponent { prior: 0.25, learns: true };
 
     fn width(ln_width: f64, variance: f64) -> WidthObservation {
         WidthObservation { ln_width, ln_speed: 0.0, ln_speed_beside: [0.0; 2], variance }

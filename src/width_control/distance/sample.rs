@@ -16,6 +16,18 @@ const UNMODELLED_RATIO: f64 = 0.17;
 /// more says more about the flow's transient than about the bead.
 const MAX_UNMODELLED_SIGMA: f64 = 0.03;
 
+/// The piece of bead over which a width is the mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "all in millimetres")]
+pub struct GaugeInterval {
+    /// Its middle along the path \[mm\].
+    pub centre_mm: f64,
+    /// Its length \[mm\].
+    pub length_mm: f64,
+    /// Error of its middle that is allowed for \[mm\].
+    pub centre_tolerance_mm: f64,
+}
+
 /// A measured width.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WidthReading {
@@ -37,20 +49,21 @@ pub struct MatchedWidth {
 }
 
 impl MatchedWidth {
-    /// Matches a width to the speeds of the piece of path in its gauge \[mm\], of which an error is
-    /// allowed for, and for an exponent of the bead. `None` where the speed history does not reach,
-    /// and where the flow was in a transient larger than [`MAX_UNMODELLED_SIGMA`] allows.
+    /// Matches a width to the speeds of its gauge, for an exponent of the bead. `None` where
+    /// the speed history does not reach, and where the flow was in a transient larger than
+    /// [`MAX_UNMODELLED_SIGMA`] allows.
     pub fn new(
         history: &SpeedHistory,
-        gauge_mm: &Range<f64>,
-        tolerance_mm: f64,
+        gauge: GaugeInterval,
         reading: WidthReading,
         exponent: f64,
     ) -> Option<Self> {
-        let Range { start, end } = *gauge_mm;
+        let (position_mm, half) = (gauge.centre_mm, 0.5 * gauge.length_mm);
+        let (start, end) = (position_mm - half, position_mm + half);
         let over = history.mean_over(start, end)?;
         let differs = |by: f64| Some(history.mean_near(start + by, end + by)?.mean - over.mean);
-        let ln_speed_beside = [differs(tolerance_mm)?, differs(-tolerance_mm)?];
+        let ln_speed_beside =
+            [differs(gauge.centre_tolerance_mm)?, differs(-gauge.centre_tolerance_mm)?];
         let unmodelled = UNMODELLED_RATIO * history.flow_change_over(start, end)?;
         if unmodelled > MAX_UNMODELLED_SIGMA {
             return None;
@@ -65,7 +78,7 @@ impl MatchedWidth {
             variance: relative.iter().map(|sigma| sigma * sigma).sum(),
         };
         Some(Self {
-            position_mm: 0.5 * (start + end),
+            position_mm,
             laid_s: history.time_at(start)?..history.time_at(end)?,
             observation,
         })
@@ -88,9 +101,10 @@ mod tests {
     }
 
     fn sample_at(position: f64) -> MatchedWidth {
-        let gauge_mm = position - 5.0..position + 5.0;
+        let gauge =
+            GaugeInterval { centre_mm: position, length_mm: 10.0, centre_tolerance_mm: 5.0 };
         let reading = WidthReading { width: Mm::constant(40.0), sigma: Mm::constant(0.4) };
-        MatchedWidth::new(&speed_history(), &gauge_mm, 5.0, reading, 0.25).unwrap()
+        MatchedWidth::new(&speed_history(), gauge, reading, 0.25).unwrap()
     }
 
     #[test]

@@ -6,8 +6,8 @@ use nalgebra::{Matrix4, Vector4};
 use super::estimate::{BeadEstimate, Exponent, WiderExponent};
 
 /// Standard deviation of ln w by what no part of the model describes, as a wave of the flow. It
-/// does not move ln A less, but b. Where an error of the offset has a larger effect than this, b is not
-/// learnt.
+/// does not move ln A less, but b. An error of the offset with a smaller effect is not learnt: a wave
+/// would be taken for it.
 const OTHER_SIGMA: f64 = 0.007;
 /// Standard deviation of b after ln v has changed by 1, as a fraction of its initial value: a
 /// bead is a power of its speed only piece by piece. papers.md gives 0.221 and 0.267 on either
@@ -33,6 +33,7 @@ pub const MAX_SQUARED_INNOVATION: f64 = 9.0;
 pub struct WidthModel {
     /// The estimate.
     pub estimate: BeadEstimate,
+    prior: Exponent,
     position_mm: Option<f64>,
     /// Smallest and largest ln(v/v₀) of all widths.
     ln_speeds: Option<(f64, f64)>,
@@ -50,6 +51,15 @@ pub struct WidthObservation {
     pub ln_speed_beside: [f64; 2],
     /// Variance of `ln_width`, without that of the offset.
     pub variance: f64,
+}
+
+/// What ln w = ln A − b·ln(v/v₀) of a piece of bead is expected to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExpectedBead {
+    /// ln A, with its pulsation.
+    pub ln_width: f64,
+    /// b.
+    pub exponent: f64,
 }
 
 /// Innovation: measured less predicted ln w.
@@ -77,7 +87,7 @@ impl WidthModel {
     /// Before the first width.
     pub fn new(exponent: Exponent) -> Self {
         let estimate = BeadEstimate::new(exponent, OFFSET_ERROR_VARIANCE);
-        Self { estimate, position_mm: None, ln_speeds: None }
+        Self { estimate, prior: exponent, position_mm: None, ln_speeds: None }
     }
 
     /// A new bead, whose flow may differ.
@@ -90,9 +100,14 @@ impl WidthModel {
     /// best, and is the same wherever the camera may look. Beside a change of the speed an error of
     /// the offset would be taken for one of b.
     pub fn informs_exponent(&self, observation: &WidthObservation) -> bool {
-        let effect = |by: &f64| (self.estimate.exponent() * by).abs();
-        self.estimate.shows_exponent(observation.ln_speed)
-            && observation.ln_speed_beside.iter().map(effect).all(|effect| effect < OTHER_SIGMA)
+        self.estimate.shows_exponent(observation.ln_speed) && !self.informs_offset(observation)
+    }
+
+    /// Whether a width informs the errors of the offset: one within its tolerance changes it by more
+    /// than what no part of the model describes. Elsewhere a slow wave would be taken for them.
+    fn informs_offset(&self, observation: &WidthObservation) -> bool {
+        let exponent = self.estimate.exponent();
+        observation.ln_speed_beside.iter().any(|by| (exponent * by).abs() >= OTHER_SIGMA)
     }
 
     /// Standard deviation of ln A, given b.
@@ -101,11 +116,15 @@ impl WidthModel {
         (of.m11 - of.m12 * of.m12 / of.m22).max(0.0).sqrt()
     }
 
-    /// Advances to a position. Returns the path to it \[mm\]; 0 backwards.
-    pub fn advance_to(&mut self, position_mm: f64) -> f64 {
-        let last = self.position_mm.unwrap_or(position_mm);
-        self.position_mm = Some(last.max(position_mm));
-        (position_mm - last).max(0.0)
+    /// Path from the newest position to another \[mm\]; 0 backwards.
+    pub fn distance_to(&self, position_mm: f64) -> f64 {
+        self.position_mm.map_or(0.0, |last| (position_mm - last).max(0.0))
+    }
+
+    /// Advances to a position; ln A has drifted by a variance.
+    pub fn advance_to(&mut self, position_mm: f64, drift: f64) {
+        self.position_mm = Some(self.position_mm.map_or(position_mm, |last| last.max(position_mm)));
+        self.estimate.shift(0.0, drift);
     }
 
     /// The innovation of an observation.
@@ -118,30 +137,36 @@ impl WidthModel {
         }
     }
 
-    /// Updates the model with a width; one that is an outlier with so much noise that it just is none. Where
-    /// `learns` is false b stays, and its uncertainty is considered (Schmidt 1966).
+    /// Updates the model with a width. Where `learns` is false b stays, away from changes of the speed
+    /// the errors of the offset stay, and their uncertainty is considered (Schmidt 1966).
     pub fn update(&mut self, observation: &WidthObservation, learns: bool) {
         if !self.estimate.is_known() {
             self.estimate.begin(observation.ln_width, observation.ln_speed);
             return;
         }
-        let WidthInnovation { by, variance } = self.innovation(observation);
-        let BeadEstimate { state, covariance, prior, .. } = &self.estimate;
-        let spread = variance - observation.variance;
+        let innovation = self.innovation(observation);
+        let BeadEstimate { state, covariance, .. } = &self.estimate;
         // The gain is at most one half: a single width may be an outlier.
-        let noise = observation.variance.max(spread).max(by * by / OUTLIER_SQUARED - spread);
+        let spread = innovation.variance - observation.variance;
+        let noise = observation.variance.max(spread);
         let slopes = observation.slopes(state);
         let informed = covariance * slopes;
         let mut gain = informed / (spread + noise);
-        gain.y = if learns && prior.learns {
+        gain.y = if learns && self.prior.learns {
             informed.y / (spread + noise + OTHER_SIGMA * OTHER_SIGMA)
         } else {
             0.0
         };
-        // Joseph's form, which holds for any gain.
-        let kept = Matrix4::identity() - gain * slopes.transpose();
-        let after = kept * covariance * kept.transpose() + gain * gain.transpose() * noise;
-        *self = self.with_estimate(state + gain * by, 0.5 * (after + after.transpose()));
+        if !self.informs_offset(observation) {
+            (gain.z, gain.w) = (0.0, 0.0);
+        }
+        let covariance = updated_covariance(covariance, &gain, &slopes, noise);
+        *self = self.with_estimate(state + gain * innovation.by, covariance);
+    }
+
+    /// The bead that it expects.
+    pub fn expected(&self) -> ExpectedBead {
+        ExpectedBead { ln_width: self.estimate.ln_width(), exponent: self.estimate.exponent() }
     }
 
     /// The model with another state.
@@ -156,14 +181,22 @@ impl WidthModel {
         let (slowest, fastest) = self.ln_speeds.unwrap_or((ln_speed, ln_speed));
         let nearest = ln_speed.clamp(slowest, fastest);
         self.ln_speeds = Some((slowest.min(ln_speed), fastest.max(ln_speed)));
-        if !self.estimate.is_known() || !self.estimate.prior.learns || nearest == ln_speed {
+        if !self.estimate.is_known() || !self.prior.learns || nearest == ln_speed {
             return None;
         }
         let beyond = (ln_speed - nearest).abs();
-        let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.estimate.prior.value).powi(2);
+        let variance = beyond * (EXPONENT_SIGMA_PER_ROOT * self.prior.prior).powi(2);
         let wider = WiderExponent { ln_speed: nearest, variance };
         self.estimate.widen_exponent(&wider);
         Some(wider)
+    }
+
+    /// Takes over a b that was estimated elsewhere. The width at ln(v/v₀) stays as it is, and the variance
+    /// of b that of this model's own widths.
+    pub fn take_exponent(&mut self, exponent: f64, ln_speed: f64) {
+        let state = &mut self.estimate.state;
+        state.x += (exponent - state.y) * ln_speed;
+        state.y = exponent;
     }
 }
 
@@ -172,6 +205,12 @@ impl WidthObservation {
     fn ln_speed_at(&self, state: &Vector4<f64>) -> f64 {
         let [ahead, behind] = self.ln_speed_beside;
         self.ln_speed + state.z * ahead + state.w * behind
+    }
+
+    /// With so large a variance that it is just no outlier.
+    pub fn weighted_as_no_outlier(self, innovation: &WidthInnovation) -> Self {
+        let more = innovation.by * innovation.by / OUTLIER_SQUARED - innovation.variance;
+        Self { variance: self.variance + more.max(0.0), ..self }
     }
 
     /// ln w that a state predicts.
@@ -184,6 +223,18 @@ impl WidthObservation {
         let [ahead, behind] = self.ln_speed_beside;
         Vector4::new(1.0, -self.ln_speed_at(state), -state.y * ahead, -state.y * behind)
     }
+}
+
+/// Covariance after an update with any gain (Joseph form).
+fn updated_covariance(
+    before: &Matrix4<f64>,
+    gain: &Vector4<f64>,
+    slopes: &Vector4<f64>,
+    noise: f64,
+) -> Matrix4<f64> {
+    let kept = Matrix4::identity() - gain * slopes.transpose();
+    let after = kept * before * kept.transpose() + gain * gain.transpose() * noise;
+    0.5 * (after + after.transpose())
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::width_control::distance::estimate::Exponent;
 const GAUGE: f64 = 63.0;
 
 fn known() -> WidthModel {
-    let mut model = WidthModel::new(Exponent { value: 0.25, learns: true });
+    let mut model = WidthModel::new(Exponent { prior: 0.25, learns: true });
     for _ in 0..50 {
         model.update(&width(3.7), false);
     }
@@ -46,7 +46,7 @@ fn last(size: f64, until: f64, is_outlier: impl Fn(u32) -> bool) -> Last {
         detector.push(front, width(ln_width + fraction * size + more), model);
         last = detector.find().map(|found| change(&model, &found));
     }
-    Last { size: last, is_under_way: detector.is_under_way }
+    Last { size: last, is_under_way: detector.is_under_way() }
 }
 
 fn found(size: f64, until: f64) -> f64 {
